@@ -232,7 +232,7 @@ void add_explore(CLI::App& app, Shared& shared, Run& run) {
       ->transform(CLI::CheckedTransformer(std::map<std::string, explore::Up>{{"y", explore::Up::kY}, {"z", explore::Up::kZ}}))
       ->option_text("AXIS");
   command->add_flag("--whole", explore.keeps_banks,
-                    "Copy banks unchanged; default: those above 4 MB are packed with an error of -60 dB(A)");
+                    "Copy banks unchanged; default: shapes of 1 MB and more are packed with an error of -60 dB(A)");
   CLI::Option* serves = command->add_flag("--serve", options->is_serving, "Serve it on this machine until Ctrl-C");
   command->add_option("--port", options->port, "With --serve: the port (default: a free one)")
       ->check(base::whole_range(1, 65535), base::describe_whole_range(1, 65535))

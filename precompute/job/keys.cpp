@@ -15,7 +15,7 @@ const base::Keys<JobSpec> kJobKeys{
      "the same as `{\"shape\": \"bar\", ...}`, a surface with the keys below, or a [known body](bodies-with-known-modes.md)"},
     {"bank", "required by `carillon-precompute`", "path of the bank; `<bank>.resolved.json` next to it is a job with the same result"},
     {"shapes", &JobSpec::shapes, kShapesNames,
-     "mode shapes in the bank: [packed](../packed-banks.md) at -60 dB(A) where they take more than 1 MB, or exact"},
+     "mode shapes in the bank: [packed](../packed-banks.md) with an error of -60 dB(A) if they take 1 MB or more, or unchanged"},
     {"accuracy_cents", &JobSpec::accuracy_cents, Limits{1e-3, 1200},
      "chooses element, mesh size and `solver.tolerance`: [choose-accuracy](choose-accuracy.md)"},
     {"material", "required", "name (`\"steel\"`) or object: [materials](materials.md)"},

@@ -88,8 +88,8 @@ class Search {
   Run& run_;
   double asked_;
   double tolerance_;
-  bool is_refinable_ = false;       // the mesh file can be refined: it is read by rank 0
-  double order_ = 4.0;              // convergence order of the errors of the last trial
+  bool is_refinable_ = false;  // the mesh file can be refined: it is read by rank 0
+  double order_ = 4.0;         // convergence order of the errors of the last trial
   AccuracyReport report_;
   Solution current_;
 };
@@ -229,7 +229,8 @@ Decision Search::decide_on_body() {
   const Trial& last = report_.trials.back();
   if (last.modes == 0) return {0, make_setting(last.setting.element, 0.5)};
   // Errors estimated on one mesh are often twenty times too large; two meshes tell more, and a second of three times the nodes is cheap.
-  const double finest = find_before(last) == nullptr ? std::pow(kFirstGrowth, -1.0 / find_dimension()) : kFinestStep;
+  const Trial* before = find_before(last);
+  const double finest = before == nullptr || before->modes == 0 ? std::pow(kFirstGrowth, -1.0 / find_dimension()) : kFinestStep;
   const double ratio = std::min(find_ratio(kGoal * asked_, finest), kMinStep);
   return {0, make_setting(last.setting.element, ratio)};
 }

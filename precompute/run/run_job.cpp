@@ -240,21 +240,17 @@ std::string describe_result(const bank::Bank& bank) {
 }  // namespace
 
 void write_bank(Run& run, const bank::Bank& bank) {
-  std::string packing = "exact shapes";
-  if (run.job.shapes == job::Shapes::exact || !bank::is_worth_packing(bank)) {
-    bank::write_bank(bank, run.bank);
+  std::string why = run.job.shapes == job::Shapes::exact ? "as the job wants" : "";
+  std::optional<bank::PackedBank> packed;
+  if (why.empty()) packed = bank::try_packed(bank, why);
+  if (packed) {
+    packed->bank.provenance = bank.provenance;  // pack/error_db has the error
+    bank::write_packed_bank(*packed, run.bank);
   } else {
-    try {
-      bank::PackedBank packed = bank::calc_packed(bank, bank::kPackError, true);
-      packed.bank.provenance = bank.provenance;
-      bank::write_packed_bank(packed, run.bank);
-      packing = "shapes packed, " + bank::describe(*packed.bank.packing);
-    } catch (const InputError& fault) {
-      bank::write_bank(bank, run.bank);
-      packing += fmt::format(", not packed: {}", fault.what());
-    }
+    bank::write_bank(bank, run.bank);
   }
-  run.log.print(fmt::format("{} bytes, {}", fs::file_size(run.bank), packing));
+  run.log.print(fmt::format("{} bytes, {}", fs::file_size(run.bank),
+                            packed ? "shapes packed, " + bank::describe(*packed->bank.packing) : fmt::format("exact shapes ({})", why)));
 }
 
 namespace {
@@ -267,9 +263,10 @@ std::string describe_end(const job::JobSpec& job, const bank::Bank& bank, const 
   for (std::size_t m = 0; m < bank.mode_count(); ++m)
     near += std::abs(1200 * std::log2(bank.corrected.freq_hz[m] / high_hz)) <= bank.corrected.error_cents[m] ? 1 : 0;
   std::string text;
-  if (near > 0) text = fmt::format("within its bar of the end of the band at {:g} Hz: {} mode{}", high_hz, near, near == 1 ? "" : "s");
-  if (complete_hz < high_hz)
-    text += fmt::format("{}modes of the body from {:.4g} Hz on may be missing", text.empty() ? "" : "; ", complete_hz);
+  if (near > 0)
+    text = fmt::format("{} mode{} may lie on either side of the band's end at {:g} Hz, within {} error bar{}", near, near == 1 ? "" : "s",
+                       high_hz, near == 1 ? "its" : "their", near == 1 ? "" : "s");
+  if (complete_hz < high_hz) text += fmt::format("{}modes above {:.4g} Hz may be missing", text.empty() ? "" : "; ", complete_hz);
   return text;
 }
 

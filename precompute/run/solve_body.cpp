@@ -39,9 +39,9 @@ ModeProperties calc_errors(Run& run, const Body& body, const AssembledSystem& sy
   errors.bars = name_errors(body.source, run, [&] { return calc_bars(run, body, system, modes); });
   if (errors.bars.level.is_guessed)
     run.log.warn_once(
-        "some facets of the mesh are one element wide and turn by 50 to 80 degrees: they may be planes of the body or samples of a round "
-        "surface; the difference is stated next to the error bars (facets in doubt); finer elements or mid-side nodes on the surface "
-        "resolve it");
+        "some faces of the mesh are one element wide and meet at 50 to 80 degrees: they may be planes of the body or a coarse round "
+        "surface. The frequencies are those of planes; the change for a round surface is stated as \"facets in doubt\". Smaller elements, "
+        "or mid-side nodes on the surface, remove the doubt");
   run.log.end();
   return errors;
 }

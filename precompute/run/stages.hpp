@@ -171,7 +171,7 @@ RunSummary run_job(const comm::Communicator& comm, const std::filesystem::path& 
 /// "run" of the resolved job and of the bank's provenance. Rank 0 only.
 base::Json describe_run(const Run& run, const Solution& found, const Measured& measured);
 
-/// Writes the bank of a job, packed as the job wants it. On one rank.
+/// Writes the bank of a job, its shapes packed unless the job wants them exact or nothing is gained. Rank 0 only.
 void write_bank(Run& run, const bank::Bank& bank);
 
 /// Its part about the program: name, version, ranks, phases.

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <new>
 #include <numeric>
 #include <utility>
 
@@ -22,8 +23,8 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kLatticePerSize = 1 << 20,
-                 kLatticePerEdge = 8.0;  // steps per body size (flat faces stay flat to contact), per shortest edge
+constexpr double kLatticePerSize = 1 << 20;  // lattice steps per body size: flat faces stay flat to contact
+constexpr double kLatticePerEdge = 8.0;      // at least, per shortest edge
 constexpr double kMostLattice = 1 << 22;
 constexpr double kMaxRelativeStep = 1.0;  // maximum step of a mode over its mean motion, so that none vanishes
 constexpr double kCavityFactor = 16.0;    // permitted error of inner walls over that of the outer surface
@@ -323,6 +324,27 @@ PackedBank calc_packed(const Bank& bank, double error_db, bool keep_numbers) {
                            (bank.provenance.empty() ? "}" : fmt::format(R"(, "of": {}}})", bank.provenance));
   packed.bank.packing = std::move(packing);
   return packed;
+}
+
+std::optional<PackedBank> try_packed(const Bank& bank, std::string& why) {
+  constexpr std::size_t kSmallBytes = 1'000'000;
+  if (bank.packing)
+    why = "packed already";
+  else if (bank.shape.size() * sizeof(std::int16_t) < kSmallBytes)
+    why = "below 1 MB";
+  else if (!find_faults(bank).empty())
+    why = "the bank has faults";
+  if (!why.empty()) return {};
+  try {
+    return calc_packed(bank, kPackError, true);
+  } catch (const InputError& fault) {
+    why = fault.what();
+  } catch (const SystemError& fault) {
+    why = fault.what();
+  } catch (const std::bad_alloc&) {
+    why = "too little memory";
+  }
+  return {};
 }
 
 Packing compare_packed(const Bank& packed, const Bank& original) {

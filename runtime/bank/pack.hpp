@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,8 +25,9 @@ struct PackedBank {
 /// and for a bank without modes. The bank must be valid. Takes seconds.
 PackedBank calc_packed(const Bank& bank, double error_db, bool keep_numbers = false);
 
-/// False for banks whose shapes take less than a megabyte, which gain little.
-inline bool is_worth_packing(const Bank& bank) { return bank.shape.size() * sizeof(std::int16_t) >= 1'000'000; }
+/// calc_packed() with kPackError and kept numbers for banks that gain by it; empty, with the reason in `why`: the shapes take less than 1
+/// MB as 16-bit numbers, the bank has faults or is packed already, the error cannot be reached, or memory is short.
+std::optional<PackedBank> try_packed(const Bank& bank, std::string& why);
 
 /// Error of an unpacked bank against its original, without witnesses. Throws InputError if they do not match. Both must be valid.
 Packing compare_packed(const Bank& packed, const Bank& original);

@@ -1,6 +1,6 @@
 // Method: a Hertz pulse of the reduced mass that explains the engine's impulse; where modes would take more than 2 % of the blow, the
 // impact is integrated from the motions before it. If the engine's impulse is less than that of rigid bodies with the same motions, the
-// forces are scaled by the ratio: what ringing adds or takes is unknown to the engine. Simultaneous hits of two bodies, as of both ends of
+// forces are scaled by the ratio: the engine knows nothing of the modes' momentum. Simultaneous hits of two bodies, as of both ends of
 // a tube, are one impact.
 // Source: runtime/physics/impact; K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 #include "runtime/drive/hit_sounds.hpp"
@@ -227,6 +227,23 @@ double HitSounds::keep_ringing(const std::array<int, 2>& bodies, const impact::I
 /// Sum of the normal impulses after which rigid bodies part at all contacts with their restitution [N s]. Projected Gauss-Seidel.
 double HitSounds::calc_rigid_push(const StepView& step, const std::vector<Contact>& contacts) {
   constexpr int kSweeps = 20;
+  // Per contact, and side a and b: change of the spin per impulse, its lever, and the sum of both sides' inverse masses.
+  struct Row {
+    std::array<Vec3, 2> turning{}, spinning{};
+    double inverse_mass = 0.0;
+  };
+  std::vector<Row> rows(contacts.size());
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const FinishedHit& hit = contacts[i].hit;
+    for (const std::size_t side : {0, 1}) {
+      const int body = side == 0 ? hit.a : hit.b;
+      if (!step.moves(body)) continue;
+      const Vec3 along = side == 0 ? hit.normal : -1.0 * hit.normal;
+      rows[i].turning[side] = cross(hit.before[side].rotation * (hit.stations_m[side] - step.scene.bodies[body].centre_m), along);
+      rows[i].spinning[side] = hit.before[side].inverse_inertia * rows[i].turning[side];
+      rows[i].inverse_mass += 1.0 / step.scene.bodies[body].mass_kg + dot(rows[i].turning[side], rows[i].spinning[side]);
+    }
+  }
   std::vector<double> pushes(contacts.size(), 0.0);
   std::array<Vec3, 2> linear{}, angular{};  // changes of the velocities of a and b
   for (int sweep = 0; sweep < (contacts.size() > 1 ? kSweeps : 1); ++sweep) {
@@ -234,21 +251,16 @@ double HitSounds::calc_rigid_push(const StepView& step, const std::vector<Contac
       const FinishedHit& hit = contacts[i].hit;
       const double e = step.calc_restitution(hit.a, hit.b);
       double missing = (1.0 + e) * std::max(0.0, hit.approach_m_s);
-      std::array<Vec3, 2> turning{};
-      for (const std::size_t side : {0, 1}) {
-        const int body = side == 0 ? hit.a : hit.b;
-        if (!step.moves(body)) continue;
-        const Vec3 along = side == 0 ? hit.normal : -1.0 * hit.normal;
-        turning[side] = cross(hit.before[side].rotation * (hit.stations_m[side] - step.scene.bodies[body].centre_m), along);
-        missing -= dot(linear[side], along) + dot(angular[side], turning[side]);
-      }
-      const double given = std::max(-pushes[i], missing / hit.inverse_mass);
+      const Row& row = rows[i];
+      for (const std::size_t side : {0, 1})
+        missing -= (side == 0 ? 1.0 : -1.0) * dot(linear[side], hit.normal) + dot(angular[side], row.turning[side]);
+      const double given = std::max(-pushes[i], missing / row.inverse_mass);
       pushes[i] += given;
       for (const std::size_t side : {0, 1}) {
         const int body = side == 0 ? hit.a : hit.b;
         if (!step.moves(body)) continue;
         linear[side] = linear[side] + (side == 0 ? given : -given) / step.scene.bodies[body].mass_kg * hit.normal;
-        angular[side] = angular[side] + given * (hit.before[side].inverse_inertia * turning[side]);
+        angular[side] = angular[side] + given * row.spinning[side];
       }
     }
   }
@@ -310,7 +322,8 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
   if (pulses.empty()) return false;
   // Predicted impulses are of single points; the integrated impact has all points, so they set no limit.
   if (first.is_predicted) most_j = std::numeric_limits<double>::max();
-  const double largest = first.is_predicted ? 1.0 : std::min(1.0, wanted / calc_rigid_push(step, contacts));
+  const double rigid = first.is_predicted ? 0.0 : calc_rigid_push(step, contacts);
+  const double largest = rigid > 0.0 ? std::min(1.0, wanted / rigid) : 1.0;
   const double scale = keep_ringing(pair, *impact, bodies, touch_s, largest, most_j);
   if (scale < largest) ++counters.limited;
   counters.impacts += std::ssize(contacts);

@@ -169,7 +169,7 @@ Vec3 TouchSpots::calc_where(const StepView& step, const Group& g, const Spot& sp
 /// `count`: positions of the pair in this step, which share its weight.
 void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& spot, std::vector<FinishedHit>& hits) {
   const double dt = step.dt_s, slowest = step.calc_slowest();
-  // Engines solve for the velocities after the step at the points that they report.
+  // Engines solve for the velocities at the end of the step, at the points that they report (get_given()).
   const double parting = dot(step.calc_relative(step.scene.motions, step.get_given(), g.a, g.b, g.stations_m), g.normal);
   double weight = calc_weight(step, g.a, g.b, g.normal) / count;
   double inverse = step.scene.calc_inverse_mass(step.get_given(), g.a, g.b, step.place(step.get_given(), g.a, g.stations_m[0]), g.normal);

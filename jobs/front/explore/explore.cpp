@@ -131,12 +131,14 @@ const BankFacts& PageBanks::add(const fs::path& file) {
   facts.kept.name = stem + ".hdf";
   for (int k = 2; taken.contains(facts.kept.name); ++k) facts.kept.name = fmt::format("{}-{}.hdf", stem, k);
   const fs::path target = folder_ / facts.kept.name;
-  if (keeps_all_ || bank.packing || !bank::is_worth_packing(bank)) {
-    put_file(file, target);
+  std::string why;
+  std::optional<bank::PackedBank> packed;
+  if (!keeps_all_) packed = bank::try_packed(bank, why);
+  if (packed) {
+    bank::write_packed_bank(*packed, target);
+    facts.kept.change = "packed, " + bank::describe(*packed->bank.packing);
   } else {
-    const bank::PackedBank packed = bank::calc_packed(bank, bank::kPackError, true);
-    bank::write_packed_bank(packed, target);
-    facts.kept.change = "packed, " + bank::describe(*packed.bank.packing);
+    put_file(file, target);
   }
   facts.kept.bytes = fs::file_size(target);
   const BankFacts& kept = facts_.emplace(whole, std::move(facts)).first->second;

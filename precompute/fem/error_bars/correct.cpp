@@ -28,7 +28,7 @@ constexpr double kRoughT4 = 0.5, kStiffT4 = 1.0, kRoughT10 = 0.3, kStiffT10 = 0.
 constexpr double kRoughWidthT4 = 0.45, kRoughWidthLumped = 0.5;                  // of the mesh's bar
 constexpr double kSingularShare = 0.25;                                          // of the estimate's energy
 constexpr double kHalf = 0.5, kHalfT4 = 0.4, kQuarter = 0.25, kThird = 1.0 / 3;  // of the mesh's bar
-constexpr double kOverlaid = 12.0;        // bar of a T4 mode with the others, over its own: scatter is the same from 2 to 12
+constexpr double kOverlaid = 12.0;        // rough: a T4 mode whose bar others make so many times its own; results are the same from 2 to 12
 constexpr double kSameEigenvalue = 1e-6;  // of lambda
 
 double to_cents(double share) { return 600 * std::log2(share); }
@@ -40,7 +40,7 @@ Correction find_correction(const ErrorParts& parts, const Level& level) {
   const double excess = calc_excess(parts, kind);
   if (excess > (is_t4 ? kStiffT4 : kStiffT10)) return Correction::kStiff;
   if (excess > (is_t4 ? kRoughT4 : kRoughT10) || parts.singular > kSingularShare * parts.interpolation) return Correction::kRough;
-  constexpr double kDoubt = 0.25;  // half of the bar
+  constexpr double kDoubt = 0.25;  // of the mesh's bar: half of the corrected one
   if (level.is_guessed && calc_facet_cents(parts) > kDoubt * calc_cents(parts, kind)) return Correction::kRough;
   return Correction::kOneMesh;
 }

@@ -30,7 +30,7 @@ struct FreeFace {
 
 struct Surface {
   std::vector<SurfaceEdge> edges;
-  std::vector<SurfaceEdge> doubts;  // gap from it to the round surface that faces with turns of 50 to 80 degrees may sample
+  std::vector<SurfaceEdge> doubts;  // gap to the round surface that faces turning by 50 to 80 degrees may stand for
   std::vector<FreeFace> free_faces;
   /// (nodes) 1 at stress singularities, where errors converge slowly: vertices of inward edges sharper than 50 degrees and of edges between
   /// fixed and free faces. Complete on every rank.

@@ -29,7 +29,7 @@ struct LocalMesh {
   std::int32_t free_nodes = 0;         // leading nodes that are owned and free; their rows are first_row, first_row + 1, ...
   std::int32_t owned_nodes = 0;        // leading nodes that are owned
   std::int32_t first_row = 0;
-  bool is_surface_known = false;  // made from the body: its facets are not to be guessed. Not serialised
+  bool is_surface_known = false;  // the run meshed the body: its facets are known. Not serialised
 
   int nodes_per_tet() const { return order == 1 ? 4 : 10; }
   /// Nodes of tetrahedron e, in local numbers.

@@ -64,7 +64,7 @@ void calc_block(const Columns& columns, std::size_t row, std::size_t column, Pro
 }
 
 void calc_products(const Columns& columns, std::size_t begin, std::size_t end, Products& products) {
-  constexpr std::size_t kWide = kLanes == 16 ? 4 : 2;  // sums fit the registers
+  constexpr std::size_t kWide = kLanes == 16 ? 4 : 2;  // keeps all sums in registers
   for (std::size_t row = begin; row < end; row += 4)
     for (std::size_t column = 0; column < row + 4; column += kWide) calc_block<kWide>(columns, row, column, products);
 }

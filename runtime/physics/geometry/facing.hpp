@@ -55,7 +55,7 @@ class SurfaceProbe {
     if (!is_inside && on.distance2 > far * far) return std::sqrt(on.distance2) - sag;
     const double gap = calc_skin_gap(shape_, x, on, is_inside);
     if (!is_inside || !(gap < limit_m)) return gap;
-    // Inside, a walk ends at the nearest face on its side of an edge.
+    // Inside, the walk may stop at an edge although another face is nearer: search all.
     const Nearest nearest = shape_.mesh().find_nearest(x, Box::kFar, on.face);
     return calc_skin_gap(shape_, x, nearest, shape_.mesh().is_inside(x, nearest));
   }

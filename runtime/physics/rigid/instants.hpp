@@ -25,8 +25,8 @@ class Instants {
   /// Searches the pairs of an impact again at its instant: closely passing edges were treated as planes until now. Keeps the touches that
   /// close within step.together_s of the first one, with gaps up to `near_m` (infinite: current gap).
   bool confirm(const Step& step, std::vector<ContactRef>& first, double step_s, double near_m) const;
-  /// Longest part of a step without impacts whose rows let no touch get much deeper: a row stops its touch at the end, half of its movement
-  /// too deep.
+  /// Longest part of a step without impacts in which no touch gets much deeper. A row stops its touch only at the end of the part, where it
+  /// is too deep by half of its movement.
   double calc_stopping_time(const Step& step) const;
 
   /// Records an impact of these hits: a pair with many slow ones rattles.

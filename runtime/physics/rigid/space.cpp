@@ -18,6 +18,7 @@ constexpr double kMaxStruckStepS = 5e-5;  // s; longest part of a step after the
 constexpr int kMaxMissed = 30;            // per step: instants at which no touch struck
 constexpr int kMaxSought = 3;             // of these, with a search for closings on the path
 constexpr int kMaxCompleted = 4;          // repeated solutions of a step with missing touches added
+constexpr int kMaxShortened = 8;          // times that a step without impacts is shortened
 constexpr int kMaxImpacts = 4;            // individual impacts of an island per step; an island with more is crowded
 constexpr int kMinImpacts = 2;            // the same for the largest islands, whose impacts cost more
 constexpr int kMaxStruckBodies = 48;      // bodies of an island times its impacts per step
@@ -132,10 +133,12 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       return true;
     };
     const bool is_completed = solve();
-    // A row stops a touch only at the end of a step, half of its movement too deep: missing touches strike at the start instead, and steps
-    // without impacts are short.
+    // Rows stop a touch only at the end of a step, when half of its movement is already penetration: missing touches strike at the start,
+    // and steps without impacts are shortened.
     if (is_completed && impacts >= max_impacts && more++ < kMaxCompleted && strike_at_once(start_s + done, h)) continue;
-    for (double stops_s = 0.0; impacts >= max_impacts && (stops_s = instants_.calc_stopping_time(step_)) < h;) {
+    for (int n = 0; n < kMaxShortened && impacts >= max_impacts; ++n) {
+      const double stops_s = instants_.calc_stopping_time(step_);
+      if (stops_s >= h) break;
       h = stops_s;
       solve();
     }

@@ -52,9 +52,8 @@ class JobFolder : public Folder {
   }
 
   Outcome run(int ranks = 1, const std::string& arguments = "job.json") const {
-    for (const auto& [name, value] : std::vector<std::array<const char*, 2>>{{"OMPI_ALLOW_RUN_AS_ROOT", "1"},
-                                                                             {"OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"},
-                                                                             {"OPENBLAS_NUM_THREADS", "1"}})
+    for (const auto& [name, value] : std::vector<std::array<const char*, 2>>{
+             {"OMPI_ALLOW_RUN_AS_ROOT", "1"}, {"OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"}, {"OPENBLAS_NUM_THREADS", "1"}})
       setenv(name, value, 1);
     const std::string command = fmt::format("cd '{}' && mpirun -np {} --oversubscribe --bind-to none '{}/carillon-precompute' {} 2>&1",
                                             path().string(), ranks, carillon::tests::get_bin_dir(), arguments);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <numeric>
 #include <random>
 
@@ -123,6 +124,23 @@ void expect_stated_error(const Bank& bank, double size_m) {
 TEST(Pack, error_of_a_box_is_as_stated) { expect_stated_error(example::make_bank(6, 9), 0.3); }
 
 TEST(Pack, error_of_a_ball_is_as_stated) { expect_stated_error(make_ball_bank(4, 20), 0.2); }
+
+TEST(Pack, by_default_leaves_small_packed_and_faulty_banks_as_they_are) {
+  std::string why;
+  EXPECT_FALSE(try_packed(make_ball_bank(3, 20), why));
+  EXPECT_EQ(why, "below 1 MB");
+  Bank bank = make_ball_bank(5, 30);
+  why.clear();
+  const std::optional<PackedBank> packed = try_packed(bank, why);
+  ASSERT_TRUE(packed) << why;
+  EXPECT_LE(packed->bank.packing->error_db, kPackError);
+  EXPECT_FALSE(try_packed(packed->bank, why));
+  EXPECT_EQ(why, "packed already");
+  bank.shape_scale[3] = std::numeric_limits<double>::quiet_NaN();
+  why.clear();
+  EXPECT_FALSE(try_packed(bank, why));
+  EXPECT_EQ(why, "the bank has faults");
+}
 
 TEST(Pack, small_banks_and_single_modes_have_the_requested_error) {
   for (const int n : {1, 2, 3})

@@ -274,7 +274,7 @@ TEST(GeometryPart, of_a_round_rod_with_six_sides_is_a_doubt_next_to_the_bars_of_
     outside += error > 50 ? 1 : 0;
     EXPECT_EQ(corrected.correction[c], bank::Correction::kRough) << m;
   }
-  EXPECT_GE(outside, 6) << "planes of the body: no longer a hard mesh";
+  EXPECT_GE(outside, 6) << "the mesh no longer has the error that this test is about";
 }
 
 TEST(GeometryPart, of_a_rod_whose_six_planes_are_two_elements_wide_is_no_doubt) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/bank/packed/fit_loops.hpp"
 #include "runtime/bank/packed/fit_shapes.hpp"
 #include "runtime/base/error.hpp"
 #include "tests/unit/runtime/bank/packed/surfaces.hpp"
@@ -184,6 +185,75 @@ TEST(CodecShapes, of_noise_read_back_within_steps) {
   }
   shapes.wanted = std::move(wanted);
   EXPECT_LT(pack(surface, shapes).worst, 1.01 * kMostLeft);
+}
+
+TEST(CodecFitLoops, of_all_instruction_sets_agree_with_sums_in_double) {
+  constexpr std::size_t kPadded = 48, kModes = 41;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> draw(-3.0F, 3.0F);
+  const auto fill = [&](std::vector<float>& row) {
+    row.assign(3 * kPadded, 0.0F);
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t m = 0; m < kModes; ++m) row[c * kPadded + m] = draw(random);
+  };
+  std::array<std::vector<float>, kNeighbours> of_neighbours;
+  std::array<const float*, kNeighbours> rows;
+  for (std::size_t k = 0; k < kNeighbours; ++k) fill(of_neighbours[k]), rows[k] = of_neighbours[k].data();
+  std::vector<float> wanted, coefficients(3 * kFields);
+  fill(wanted);
+  for (float& x : coefficients) x = 0.1F * draw(random);
+  Stencil stencil;
+  for (std::size_t k = 0; k < kNeighbours; ++k) {
+    stencil.value[k] = draw(random);
+    for (std::size_t j = 0; j < 3; ++j) stencil.gradient[j][k] = draw(random), stencil.offset[j][k] = draw(random);
+  }
+  const ResidualCost model{.step = 0.7F, .rounding = 0.4F, .bits_of_0 = 0.25F, .bits_of_1 = 2.5F, .per_error = 3.0F};
+  for (const base::Instructions set : base::list_instructions()) {
+    SCOPED_TRACE(base::get_name(set));
+    const FitLoops& loops = find_fit_loops(set);
+    Columns columns(kPadded);
+    loops.calc_columns(rows.data(), wanted.data(), stencil, columns);
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t m = 0; m < kModes; ++m) {
+        const auto get = [&](std::size_t k) { return static_cast<double>(of_neighbours[k][c * kPadded + m]); };
+        double value = 0.0;
+        std::array<double, 3> gradient{};
+        for (std::size_t k = 0; k < kNeighbours; ++k) {
+          value += static_cast<double>(stencil.value[k]) * get(k);
+          for (std::size_t j = 0; j < 3; ++j) gradient[j] += static_cast<double>(stencil.gradient[j][k]) * get(k);
+        }
+        EXPECT_NEAR(columns.get(c)[m], static_cast<double>(wanted[c * kPadded + m]) - value, 1e-3);
+        for (std::size_t j = 0; j < 3; ++j) EXPECT_NEAR(columns.get(Columns::kGradient + 3 * c + j)[m], gradient[j], 1e-3);
+        for (std::size_t k = 0; k < kNeighbours; ++k) {
+          double left = get(k) - value;
+          for (std::size_t j = 0; j < 3; ++j) left -= gradient[j] * static_cast<double>(stencil.offset[j][k]);
+          EXPECT_NEAR(columns.get(Columns::kDifferences + kNeighbours * c + k)[m], left, 1e-2);
+        }
+      }
+    Products products{};
+    loops.calc_products(columns, 0, Columns::kDifferences, products);
+    loops.calc_products(columns, Columns::kDifferences, Columns::kCount, products);
+    for (std::size_t i = 0; i < Columns::kUsed; ++i)
+      for (std::size_t j = 0; j <= i; ++j) {
+        double sum = 0.0, size = 0.0;
+        for (std::size_t m = 0; m < kPadded; ++m) {
+          const double part = static_cast<double>(columns.get(i)[m]) * static_cast<double>(columns.get(j)[m]);
+          sum += part;
+          size += std::abs(part);
+        }
+        EXPECT_NEAR(products[i * Columns::kCount + j], sum, 1e-5 * size) << i << " " << j;
+      }
+    double cost = 0.0;
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t m = 0; m < kPadded; ++m) {
+        double left = static_cast<double>(columns.get(c)[m]);
+        for (std::size_t f = 0; f < kFields; ++f)
+          left -= static_cast<double>(coefficients[3 * f + c]) * static_cast<double>(columns.get(Columns::kGradient + f)[m]);
+        const double x = std::abs(left) / 0.7, q = std::floor(x + 0.4);
+        cost += (q > 0.0 ? 2.5 + 2.0 * std::log2(q) : 0.25) + 3.0 * (x - q) * (x - q);
+      }
+    EXPECT_NEAR(loops.calc_cost(columns, coefficients.data(), kFields, model) / cost, 1.0, 0.02);
+  }
 }
 
 // ---- damaged bytes ----
