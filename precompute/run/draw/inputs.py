@@ -1,9 +1,12 @@
 """Input files of carillon-draw, checked."""
 import hashlib
+import io
 import json
 import math
 import os
 import pathlib
+import subprocess
+import sys
 
 import h5py
 import numpy
@@ -12,6 +15,18 @@ from common import InputError
 from far_field import calc_far_pattern
 
 MAX_ORDER = 120  # of multipoles (runtime/bank/multipoles.hpp)
+
+
+def unpack(path):
+    """The bytes of a packed bank as a plain one, by carillon-bank, which is next to this program."""
+    program = pathlib.Path(sys.argv[0]).resolve().parent / "carillon-bank"
+    try:
+        done = subprocess.run([program, "unpack", path, "-"], capture_output=True)
+    except OSError as error:
+        raise InputError(f"{path}: is a packed bank, and {program} does not run ({error.strerror}); install it there") from None
+    if done.returncode != 0:
+        raise InputError(done.stderr.decode(errors="replace").strip().removeprefix("carillon-bank: "))
+    return done.stdout
 
 
 class Bank:
@@ -28,15 +43,14 @@ class Bank:
         if not first.startswith(b"CARILLON BANK "):
             raise InputError(f"{path}: not a mode bank (it does not begin with 'CARILLON BANK'); make one with carillon-precompute")
         version = first[14:].decode("ascii", "replace")
-        if version.split(".")[0] != "1":
-            if version.startswith("2."):
-                raise InputError(f"{path}: is a packed bank; convert it with carillon-bank unpack")
-            raise InputError(f"{path}: bank version {version} is newer than 1.x, which this program reads; use a newer carillon-draw")
-        if len(data) < 4096 or hashlib.sha256(data[:4032] + data[4096:]).hexdigest().encode() != data[4032:4096]:
+        self.unpacked = unpack(self.path) if version.startswith("2.") else None
+        if version.split(".")[0] not in ("1", "2"):
+            raise InputError(f"{path}: bank version {version} is newer than this program reads; use a newer carillon-draw")
+        if not self.unpacked and (len(data) < 4096 or hashlib.sha256(data[:4032] + data[4096:]).hexdigest().encode() != data[4032:4096]):
             raise InputError(f"{path}: the bank is truncated or was changed (SHA-256 mismatch); copy or compute it again")
         del data
         try:
-            with h5py.File(self.path, "r") as file:
+            with self.open() as file:
                 self.vertices = file["mesh/vertices"][:]
                 self.triangles = file["mesh/triangles"][:]
                 self.mesh_hz = file["modes/frequency_hz"][:]
@@ -49,6 +63,9 @@ class Bank:
         except (OSError, KeyError, TypeError, ValueError, AttributeError, OverflowError, RuntimeError, MemoryError) as error:
             raise InputError(f"{path}: the bank cannot be read ({error}); run carillon-bank check on it") from None
         self.check()
+
+    def open(self):
+        return h5py.File(io.BytesIO(self.unpacked) if self.unpacked else self.path, "r")
 
     def check(self):
         """InputError for inconsistent arrays, non-finite numbers or invalid triangles."""
@@ -83,7 +100,7 @@ class Bank:
     def read_mode(self, number):
         """The displacement of mode `number`, counted from 1, at every surface vertex; any scale."""
         try:
-            with h5py.File(self.path, "r") as file:
+            with self.open() as file:
                 steps, scale = file["modes/shape"][:, number - 1, :].astype(float), float(file["modes/shape_scale"][number - 1])
         except (OSError, KeyError, TypeError, ValueError, IndexError, RuntimeError) as error:
             raise InputError(f"{self.path}: mode {number} cannot be read ({error}); run carillon-bank check on it") from None
@@ -99,7 +116,7 @@ class Multipoles:
     def __init__(self, bank):
         path = bank.path
         try:
-            with h5py.File(path, "r") as file:
+            with bank.open() as file:
                 if "radiation" not in file:
                     raise InputError(
                         f"{path}: the bank has no multipoles; add them with"
