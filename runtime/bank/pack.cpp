@@ -26,10 +26,12 @@ namespace {
 constexpr double kLatticePerSize = 1 << 20;  // lattice steps per body size: flat faces stay flat to contact
 constexpr double kLatticePerEdge = 8.0;      // at least, per shortest edge
 constexpr double kMostLattice = 1 << 22;
-constexpr double kMaxRelativeStep = 1.0;  // maximum step of a mode over its mean motion, so that none vanishes
-constexpr double kCavityFactor = 16.0;    // permitted error of inner walls over that of the outer surface
-constexpr double kSurfaceShare = 0.95;    // fraction of the surface within the stated error
-constexpr double kMaxSlackDb = 0.8;       // dB below the requested error: converged
+// Maximum step of a mode over its mean motion: so that none vanishes, and, per root of the error, so that soft blows, which leave only
+// modes that are hardly heard, keep their sound.
+constexpr double kMaxRelativeStep = 1.0, kMaxStepPerError = 560.0;
+constexpr double kCavityFactor = 16.0;  // permitted error of inner walls over that of the outer surface
+constexpr double kSurfaceShare = 0.95;  // fraction of the surface within the stated error
+constexpr double kMaxSlackDb = 0.8;     // dB below the requested error: converged
 constexpr int kMaxSampledTrials = 5, kMaxNearTrials = 3,
               kMaxTrials = 20;                            // trials on a sample; on all vertices until near; on all vertices
 constexpr std::size_t kSubsampling = 8;                   // subsampling of the finest level in sampled trials
@@ -137,7 +139,7 @@ std::vector<float> calc_steps(const Bank& bank, const std::vector<double>& motio
   const double share = 12.0 * error * loudest / static_cast<double>(bank.mode_count());
   std::vector<float> step;
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
-    const double most = kMaxRelativeStep * motion[m];
+    const double most = std::min(kMaxRelativeStep, kMaxStepPerError * std::sqrt(error)) * motion[m];
     const double wanted = weight[m] > 0.0 ? bank.shape_scale[m] * std::sqrt(share / weight[m]) : most;
     step.push_back(static_cast<float>(std::min(wanted, most)));
   }

@@ -267,7 +267,7 @@ with tempfile.TemporaryDirectory() as name:
         (["modes", "text.hdf", "-o", "x.png"], ["text.hdf", "not a mode bank"]),
         (["modes", "short.hdf", "-o", "x.png"], ["short.hdf", "SHA-256"]),
         (["modes", "newer.hdf", "-o", "x.png"], ["newer.hdf", "version 3.0"]),
-        (["modes", "packed.hdf", "-o", "x.png"], ["packed.hdf", "checksum differs"]),
+        (["modes", "packed.hdf", "-o", "x.png"], ["packed.hdf", "is missing"]),
         (["modes", "ball.hdf", "-o", "x.png", "--modes", "1,5"], ["no mode 5", "which has 4", "1 to 4"]),
         (["modes", "ball.hdf", "-o", "x.png", "--modes", "0"], ["no mode 0", "1 to 4"]),
         (["modes", "ball.hdf", "-o", "x.png", "--modes", "first"], ["'first'", "1 to 4"]),
