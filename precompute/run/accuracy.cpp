@@ -365,7 +365,7 @@ Solution Search::solve(AccuracyReport& report) {
     }
     run_.comm.agree([&] {
       if (run_.comm.is_root()) decision = decide();
-      // CPU seconds, and so decisions, differ between runs; a resumed run takes the setting of the interrupted one.
+      // A resumed run takes the setting of the interrupted one.
       if (const Setting* kept = run_.checkpoint ? run_.checkpoint->find_setting(report_.trials.size()) : nullptr;
           kept != nullptr && decision.is_done == 0)
         decision.setting = *kept;

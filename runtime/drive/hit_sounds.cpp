@@ -227,7 +227,7 @@ double HitSounds::keep_ringing(const std::array<int, 2>& bodies, const impact::I
 /// Sum of the normal impulses after which rigid bodies part at all contacts with their restitution [N s]. Projected Gauss-Seidel.
 double HitSounds::calc_rigid_push(const StepView& step, const std::vector<Contact>& contacts) {
   constexpr int kSweeps = 20;
-  // Per contact, and side a and b: change of the spin per impulse, its lever, and the sum of both sides' inverse masses.
+  // Of a contact: levers and spins per impulse of sides a and b; inverse effective mass.
   struct Row {
     std::array<Vec3, 2> turning{}, spinning{};
     double inverse_mass = 0.0;

@@ -11,7 +11,7 @@
 
 namespace carillon::drive {
 
-/// What touches at a point. As in our own contact, the rim of a curved surface has the curvature of that surface, however it is tilted.
+/// Edges near a contact point. A rim has the curvature of its curved surface at any tilt, as in rigid contact.
 struct NearEdges {
   int directions = 0;       // of edges between flat facets: 0 on a face, 1 on an edge, 2 at a corner
   Vec3 rim_m{}, outward{};  // nearest point of a rim, and the normal of the curved surface there; zeros: none

@@ -13,7 +13,7 @@ namespace carillon::packed {
 
 inline constexpr std::size_t kGradientFields = 9, kFields = kGradientFields + 3 * kNeighbours;
 
-/// What kriging leaves of the shapes at a vertex, and the fields that may predict it: columns of one number per mode.
+/// Kriging residual of a vertex and its candidate predictors; a column has a number per mode.
 class Columns {
  public:
   // Left: component c at c. Gradient along axis j of component c at kGradient + 3 c + j; difference of neighbour k at kDifferences +
@@ -52,7 +52,7 @@ struct FitLoops {
   void (*calc_columns)(const float* const* rows, const float* wanted, const Stencil& stencil, Columns& columns);
   /// Inner products of the columns [begin, end), multiples of 4, with all columns up to their own.
   void (*calc_products)(const Columns& columns, std::size_t begin, std::size_t end, Products& products);
-  /// Cost of what the first `fields` fields leave with coefficients (fields, 3). log2 is piecewise linear: off by 0.09 at most.
+  /// Cost of the residual after the first `fields` fields with coefficients (fields, 3). Piecewise linear log2: error below 0.09.
   float (*calc_cost)(const Columns& columns, const float* coefficients, std::size_t fields, const ResidualCost& model);
 };
 

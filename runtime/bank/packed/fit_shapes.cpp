@@ -31,7 +31,7 @@ float find_of_level(const std::array<float, N>& values, std::size_t from_finest)
   return values[std::min(from_finest, N - 1)];
 }
 
-// No memory of its own: a million are made per bank.
+// Fixed capacity instead of heap memory: a million instances per bank.
 using Coefficients = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kFields, 3>;
 using Rounded = Eigen::Matrix<int, Eigen::Dynamic, 3, 0, kFields, 3>;
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kFields, kFields>;
@@ -69,14 +69,14 @@ class Fitter {
 
   void begin_vertex(std::size_t v) {
     share_ = LevelSteps::calc_share(fineness_[v]);
-    cost_.step = step_ = share_ * level_step_;
+    cost_.step = share_ * level_step_;
     get_wanted_(v, wanted_);
   }
 
   LevelNumbers fit_level(std::size_t level) {
     const std::size_t first = surface_.level_begin[level], end = surface_.level_begin[level + 1];
     const std::size_t from_finest = surface_.level_count() - 1 - level;
-    level_step_ = step_ = find_of_level(kResidualSteps, from_finest);
+    level_step_ = find_of_level(kResidualSteps, from_finest);
     cost_.rounding = find_of_level(kRounding, from_finest);
     is_finest_ = from_finest == 0;
     LevelNumbers numbers;
@@ -145,7 +145,7 @@ class Fitter {
       const auto row = static_cast<Eigen::Index>(j);
       step[j] = unit * static_cast<double>(j < kGradientFields ? steps.gradient : steps.differences);
       for (std::size_t i = 0; i <= j; ++i) regular(row, static_cast<Eigen::Index>(i)) = get_product(j, Columns::kGradient + i);
-      const double weight = static_cast<double>(step_) / step[j];
+      const double weight = static_cast<double>(cost_.step) / step[j];
       regular(row, row) += kPrior * weight * weight + 1e-12;
       for (std::size_t to = 0; to < 3; ++to) target(row, static_cast<Eigen::Index>(to)) = get_product(j, to);
     }
@@ -217,7 +217,7 @@ class Fitter {
     const std::size_t padded = columns_.get_padded(), before = numbers.residual.size();
     numbers.residual.resize(before + 3 * modes_);
     std::int32_t* number = numbers.residual.data() + before;
-    const float per_step = 1.0F / step_;
+    const float per_step = 1.0F / cost_.step;
     std::int32_t any = 0;
     for (std::size_t m = 0; m < modes_; ++m) {
       for (std::size_t c = 0; c < 3; ++c) {
@@ -225,7 +225,7 @@ class Fitter {
         const float x = (wanted_[c * padded + m] - value) * per_step;
         const auto size = static_cast<std::int32_t>(std::min(std::abs(x) + cost_.rounding, kMaxSteps));
         *number = x < 0.0F ? -size : size;
-        value += step_ * static_cast<float>(*number);
+        value += cost_.step * static_cast<float>(*number);
         any |= *number++;
       }
     }
@@ -252,8 +252,8 @@ class Fitter {
   std::vector<std::int16_t> shape_row_, shape_;
   bool is_finest_ = false;
   float level_step_ = 1.0F;
-  // Of a vertex. Its steps are `share_` of the level's.
-  float share_ = 1.0F, step_ = 1.0F, energy_ = 0.0F;  // mean square of the neighbours
+  // Of a vertex: its step over that of the level; mean square of the neighbours.
+  float share_ = 1.0F, energy_ = 0.0F;
   std::array<const float*, kNeighbours> from_{};
   Columns columns_;
   Products products_{};

@@ -12,8 +12,7 @@
 namespace carillon::packed {
 
 /// Numbers for write_shapes() with which read_shapes() reproduces the wanted rows, in surface order and in steps of each mode, to about
-/// 2^(-fineness / 2) steps, fineness (V) per vertex; and what it will decode. `factor` (padded): steps of the decoded
-/// shape per step of the mode.
+/// 2^(-fineness / 2) steps, fineness (V) per vertex; and the decoded shapes. `factor`: calc_factors().
 ///
 /// Method: three predictions per vertex, kriging alone and with coefficients of either kind (Fit); the one with the lowest rate-distortion
 ///   cost (Lagrange multiplier, bits of a geometric distribution) is chosen. Coefficients: regularised least squares over all modes,

@@ -189,7 +189,7 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
     return n >= 0 ? step.free[n].placed.frame : bodies_.get_frame(body);
   };
   geometry::Touch moved = t.smooth ? touches_.find_moved(pair, t, get_frame(pair.a), get_frame(pair.b)) : t;
-  const bool moves = t.smooth && !touches_.is_far_jump(pair, t, moved);  // not from one end of a rod to the other, a touch of its own
+  const bool moves = t.smooth && !touches_.is_far_jump(pair, t, moved);  // false for a separate touch, e.g. the other end of a rod
   if (!moves) moved = t;
   const Vec3& later = moved.where_m;
   // The impulse acts at mid-step, at the same point for both bodies.

@@ -76,7 +76,7 @@ Result pack(const Surface& surface, const Shapes& shapes) {
   result.bytes = write_shapes(shapes.step, fitted.levels);
   result.shape = read_shapes(example::as_bytes(result.bytes), surface, shapes.scale, "shapes");
   EXPECT_EQ(result.shape.size(), surface.places.size() * shapes.modes * 3);
-  EXPECT_EQ(result.shape, fitted.shape);  // the writer knows what is read
+  EXPECT_EQ(result.shape, fitted.shape);  // encoder and decoder agree
   double count = 0.0;
   for (std::size_t v = 0; v < surface.places.size(); ++v) {
     for (std::size_t m = 0; m < shapes.modes; ++m) {
