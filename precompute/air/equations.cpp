@@ -91,12 +91,13 @@ void BlockInverse::apply(Sides& rows) const {
 
 double calc_coupling(double k, double radius_m) { return 1.0 / std::max(k, 1.0 / radius_m); }
 
-BoundaryEquations::BoundaryEquations(const RadiatingSurface& surface, const Sphere& sphere, std::vector<float> velocity, std::size_t count)
+BoundaryEquations::BoundaryEquations(const RadiatingSurface& surface, const Sphere& sphere, std::vector<float> velocity, std::size_t count,
+                                     StaticPart static_part)
     : surface_(surface),
       velocity_(std::move(velocity)),
       count_(count),
       sphere_(sphere),
-      static_(make_static_part(surface, velocity_, count)),
+      static_(std::move(static_part)),
       mass_(surface.count_nodes()) {
   for (const Facet& facet : surface_.get_facets())
     for (const std::int32_t node : facet.corners) mass_[node] += facet.area_m2 / 3.0;

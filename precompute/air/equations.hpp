@@ -54,7 +54,11 @@ class BoundaryEquations {
  public:
   /// `velocity`: (T, 3, n) normal velocities at the corners of the facets of `surface`; `sphere` encloses it. The surface must outlive
   /// this.
-  BoundaryEquations(const RadiatingSurface& surface, const Sphere& sphere, std::vector<float> velocity, std::size_t count);
+  BoundaryEquations(const RadiatingSurface& surface, const Sphere& sphere, std::vector<float> velocity, std::size_t count,
+                    StaticPart static_part);
+  /// Computes the static part.
+  BoundaryEquations(const RadiatingSurface& surface, const Sphere& sphere, const std::vector<float>& velocity, std::size_t count)
+      : BoundaryEquations(surface, sphere, velocity, count, make_static_part(surface, velocity, count, 0, surface.count_nodes())) {}
 
   /// Rows first .. last - 1 at wave number k > 0 [1/m] with q = v of the velocities `sides`. A row has the same bits in every range.
   void assemble(double k, std::span<const std::int32_t> sides, std::size_t first, std::size_t last, LinearSystem& system) const;

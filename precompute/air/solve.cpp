@@ -518,8 +518,11 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
   AirSolution solution;
   if (radiator.count_modes() == 0) return solution;
   const auto surface = comm.agree([&] { return std::make_unique<RadiatingSurface>(radiator.nodes_m, radiator.triangles); });
+  std::vector<float> velocity = comm.agree([&] { return reorder(*surface, radiator); });
+  StaticPart static_part = share_static_part(comm, *surface, velocity, radiator.count_motions());
   const auto equations = comm.agree([&] {
-    return std::make_unique<BoundaryEquations>(*surface, radiator.sphere, reorder(*surface, radiator), radiator.count_motions());
+    return std::make_unique<BoundaryEquations>(*surface, radiator.sphere, std::move(velocity), radiator.count_motions(),
+                                               std::move(static_part));
   });
   solution.sphere = equations->get_sphere();
   solution.unknowns = surface->count_nodes();

@@ -173,17 +173,24 @@ std::size_t StaticPart::calc_bytes() const {
          (single.size() + adjoint.size()) * sizeof(double);
 }
 
-StaticPart make_static_part(const RadiatingSurface& surface, std::span<const float> velocity, std::size_t count) {
+StaticPart make_static_part(const RadiatingSurface& surface, std::span<const float> velocity, std::size_t count, std::size_t first_row,
+                            std::size_t last_row) {
   const std::vector<Facet>& facets = surface.get_facets();
-  const std::size_t nodes = surface.count_nodes();
+  const std::size_t rows = last_row - first_row;
+  const auto is_mine = [&](std::int32_t node) {
+    return static_cast<std::size_t>(node) >= first_row && static_cast<std::size_t>(node) < last_row;
+  };
   const Neighbours neighbours(surface);
-  std::vector<std::vector<std::int32_t>> near(facets.size()), columns(nodes);
+  std::vector<std::vector<std::int32_t>> near(facets.size()), columns(rows);
   for (std::size_t s = 0; s < facets.size(); ++s) {
+    if (std::none_of(facets[s].corners.begin(), facets[s].corners.end(), is_mine)) continue;
     neighbours.find(s, near[s]);
-    for (const std::int32_t i : facets[s].corners) {
-      for (const std::int32_t t : near[s]) columns[i].insert(columns[i].end(), facets[t].corners.begin(), facets[t].corners.end());
-      std::sort(columns[i].begin(), columns[i].end());
-      columns[i].erase(std::unique(columns[i].begin(), columns[i].end()), columns[i].end());
+    for (const std::int32_t node : facets[s].corners) {
+      if (!is_mine(node)) continue;
+      std::vector<std::int32_t>& row = columns[static_cast<std::size_t>(node) - first_row];
+      for (const std::int32_t t : near[s]) row.insert(row.end(), facets[t].corners.begin(), facets[t].corners.end());
+      std::sort(row.begin(), row.end());
+      row.erase(std::unique(row.begin(), row.end()), row.end());
     }
   }
   StaticPart part;
@@ -195,8 +202,8 @@ StaticPart make_static_part(const RadiatingSurface& surface, std::span<const flo
   part.double_layer.resize(part.column.size());
   part.normals.resize(part.column.size());
   part.curls.resize(part.column.size());
-  part.single.resize(nodes * count);
-  part.adjoint.resize(nodes * count);
+  part.single.resize(rows * count);
+  part.adjoint.resize(rows * count);
   const std::vector<OuterPoint> fine = make_rule(true), coarse = make_rule(false);
   for (std::size_t s = 0; s < facets.size(); ++s) {
     const Facet& outer = facets[s];
@@ -209,7 +216,8 @@ StaticPart make_static_part(const RadiatingSurface& surface, std::span<const flo
       subtract_midpoints(surface, outer, inner, pair);
       const double normals = dot(outer.normal, inner.normal);
       for (std::size_t i = 0; i < 3; ++i) {
-        const std::int32_t row = outer.corners[i];
+        if (!is_mine(outer.corners[i])) continue;
+        const std::size_t row = static_cast<std::size_t>(outer.corners[i]) - first_row;
         const auto begin = part.column.begin() + static_cast<std::ptrdiff_t>(part.first[row]);
         const auto end = part.column.begin() + static_cast<std::ptrdiff_t>(part.first[row + 1]);
         for (std::size_t j = 0; j < 3; ++j) {
@@ -229,6 +237,25 @@ StaticPart make_static_part(const RadiatingSurface& surface, std::span<const flo
     }
   }
   return part;
+}
+
+StaticPart share_static_part(const comm::Communicator& comm, const RadiatingSurface& surface, std::span<const float> velocity,
+                             std::size_t count) {
+  const std::size_t nodes = surface.count_nodes(), ranks = comm.size(), rank = comm.rank();
+  StaticPart own = comm.agree([&] { return make_static_part(surface, velocity, count, nodes * rank / ranks, nodes * (rank + 1) / ranks); });
+  if (ranks == 1) return own;
+  const std::vector<std::size_t> sizes = comm.all_gather([&] {
+    std::vector<std::size_t> list;
+    for (std::size_t row = 1; row < own.first.size(); ++row) list.push_back(own.first[row] - own.first[row - 1]);
+    return list;
+  });
+  comm.agree([&] {
+    own.first.assign(1, 0);
+    for (const std::size_t size : sizes) own.first.push_back(own.first.back() + size);
+  });
+  own.column = comm.all_gather(own.column);
+  for (auto* values : {&own.double_layer, &own.normals, &own.curls, &own.single, &own.adjoint}) *values = comm.all_gather(*values);
+  return own;
 }
 
 }  // namespace carillon::air

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "precompute/air/surface.hpp"
+#include "precompute/comm/communicator.hpp"
 
 namespace carillon::air {
 
@@ -14,8 +15,8 @@ namespace carillon::air {
 /// of a regular mesh.
 inline constexpr float kNearPoints = 0.8123F;
 
-/// Sparse correction of the static Galerkin integrals over near pairs of facets, exact minus midpoint rule. N nodes, n velocities. Rows
-/// have ascending columns, the same for all three matrices; (first[i] .. first[i + 1]): row of node i.
+/// Sparse correction of the static Galerkin integrals over near pairs of facets, exact minus midpoint rule: rows of N nodes, n velocities.
+/// Rows have ascending columns, the same for all three matrices; (first[i] .. first[i + 1]): row i.
 struct StaticPart {
   std::vector<std::size_t> first;    // (N + 1)
   std::vector<std::int32_t> column;  // nodes
@@ -28,8 +29,13 @@ struct StaticPart {
   std::size_t calc_bytes() const;
 };
 
-/// `velocity`: (T, 3, n) at the corners of each facet, linear between them. Inner integrals are in closed form, so walls may be much
-/// thinner than a facet.
-StaticPart make_static_part(const RadiatingSurface& surface, std::span<const float> velocity, std::size_t count);
+/// Rows of the nodes first_row .. last_row - 1. `velocity`: (T, 3, n) at the corners of each facet, linear between them. Inner integrals
+/// are in closed form, so walls may be much thinner than a facet. A row has the same bits in every range.
+StaticPart make_static_part(const RadiatingSurface& surface, std::span<const float> velocity, std::size_t count, std::size_t first_row,
+                            std::size_t last_row);
+
+/// Rows of all nodes, each integrated by one rank and known to all. Collective.
+StaticPart share_static_part(const comm::Communicator& comm, const RadiatingSurface& surface, std::span<const float> velocity,
+                             std::size_t count);
 
 }  // namespace carillon::air
