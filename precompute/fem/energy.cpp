@@ -25,7 +25,19 @@ mesh::LocalMesh take_material(const mesh::LocalMesh& local, const Materials& mat
   return part;
 }
 
-/// phi_j^T A phi_j of every column. Collective.
+/// (modes, materials), rows normalised to sum 1.
+std::vector<double> normalise(const std::vector<std::vector<double>>& by_material, std::int64_t modes) {
+  std::vector<double> shares;
+  for (std::int64_t j = 0; j < modes; ++j) {
+    double sum = 0.0;
+    for (const auto& forms : by_material) sum += forms[j];
+    for (const auto& forms : by_material) shares.push_back(forms[j] / sum);
+  }
+  return shares;
+}
+
+}  // namespace
+
 std::vector<double> calc_forms(const comm::Communicator& comm, Mat a, Mat shapes, std::int64_t modes) {
   std::vector<double> forms(modes, 0.0);
   petsc::VecHandle x, y;
@@ -49,19 +61,6 @@ std::vector<double> calc_forms(const comm::Communicator& comm, Mat a, Mat shapes
   comm.sum(forms);
   return forms;
 }
-
-/// (modes, materials), rows normalised to sum 1.
-std::vector<double> normalise(const std::vector<std::vector<double>>& by_material, std::int64_t modes) {
-  std::vector<double> shares;
-  for (std::int64_t j = 0; j < modes; ++j) {
-    double sum = 0.0;
-    for (const auto& forms : by_material) sum += forms[j];
-    for (const auto& forms : by_material) shares.push_back(forms[j] / sum);
-  }
-  return shares;
-}
-
-}  // namespace
 
 std::vector<double> calc_decay_per_s(const Materials& materials, const EnergyShares& shares, std::span<const double> lambda) {
   std::vector<double> decay_per_s;

@@ -23,6 +23,9 @@ struct Decay {
   EnergyShares shares;              // empty for a single material (not computed)
 };
 
+/// phi_j^T A phi_j of the first `modes` columns of `shapes`. Collective.
+std::vector<double> calc_forms(const comm::Communicator& comm, Mat a, Mat shapes, std::int64_t modes);
+
 /// Decay rates [1/s] at these eigenvalues, which may differ from those of the shapes behind `shares`: (modes). Pure.
 std::vector<double> calc_decay_per_s(const Materials& materials, const EnergyShares& shares, std::span<const double> lambda);
 

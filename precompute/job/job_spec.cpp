@@ -220,6 +220,10 @@ JobSpec read_root(base::Object job, const fs::path& file, BankKey bank) {
   read_air(job, spec);
   read_nonlinear(job, spec);
   spec.resources = read_resources(job);
+  if (spec.sensitivities > 0 && spec.analytic)
+    job.fail("sensitivities", "are for finite elements, and this body has a formula or a table; give its shape or mesh, or remove it");
+  if (spec.sensitivities > 0 && !spec.materials.empty())
+    job.fail("sensitivities", "are for bodies of one material; remove \"materials\", or the sensitivities");
   job.ignore("run");
   job.finish();
   check_outputs(job, spec);

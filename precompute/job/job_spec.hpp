@@ -99,6 +99,7 @@ struct JobSpec {
   std::optional<AnalyticBody> analytic;       // alternative to both: known modes, no mesh
   std::filesystem::path bank;                 // absolute; empty: none given
   Shapes shapes = Shapes::packed;             // in the bank
+  int sensitivities = 0;                      // modes with sensitivities, the lowest; 0: none
   Material material;                          // of the whole body, or of regions not in `materials`
   bool has_material = true;                   // false: `materials` must cover all regions; `material` is its first
   std::map<std::string, Material> materials;  // by region of the mesh: its tag as text, or its name

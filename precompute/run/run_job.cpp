@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "precompute/fem/derivatives.hpp"
 #include "precompute/job/job_spec.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/accuracy.hpp"
@@ -123,8 +124,20 @@ bank::Proof make_proof(const eigen::Modes& modes) {
   return proof;
 }
 
+/// Sensitivities of a bank whose surface still has the mesh's order. Rank 0 only.
+bank::Sensitivities make_sensitivities(const job::JobSpec& job, const Body& body, const bank::Bank& bank,
+                                       const fem::Derivatives& derivatives) {
+  std::vector<std::uint8_t> fixed;
+  for (const std::int32_t row : body.surface.row) fixed.push_back(row < 0 ? 1 : 0);
+  bank::Sensitivities made = bank::calc_sensitivities(bank, job.material.calc_elasticity_pa(), job.material.density_kg_m3,
+                                                      static_cast<std::size_t>(job.sensitivities), fixed);
+  made.parameters = base::Json::array(derivatives.parameters).line();
+  made.by_parameter = derivatives.values;
+  return made;
+}
+
 /// Makes the bank without its provenance; moves the surface out of `found.body` and the steps out of `surface_modes`. Rank 0 only.
-bank::Bank make_bank(const job::JobSpec& job, Solution& found, io::SurfaceModes& surface_modes) {
+bank::Bank make_bank(const job::JobSpec& job, Solution& found, io::SurfaceModes& surface_modes, const fem::Derivatives& derivatives) {
   Body& body = found.body;
   const SolvedBody& solved = found.solved;
   const eigen::Modes& modes = solved.modes;
@@ -153,6 +166,7 @@ bank::Bank make_bank(const job::JobSpec& job, Solution& found, io::SurfaceModes&
   bank.complete = modes.band_count == static_cast<std::int64_t>(modes.lambda.size());
   bank.element = job::to_text(found.setting.element);
   bank.mass = job::to_text(job.mass);
+  if (!derivatives.parameters.empty()) bank.sensitivities = make_sensitivities(job, body, bank, derivatives);
   if (job.max_modes) bank::keep_lowest(bank, static_cast<std::size_t>(*job.max_modes));
   return bank;
 }
@@ -185,14 +199,21 @@ void check_options_used(const comm::Communicator& comm) {
 /// The bank of the solution, on rank 0 only. Frees the shapes of all nodes.
 bank::Bank collect_bank(Run& run, Solution& found) {
   SolvedBody& solved = found.solved;
-  run.log.begin("collect", "shapes on the surface, radiation gains");
+  run.log.begin("collect", run.job.sensitivities > 0 ? "shapes on the surface, radiation gains, sensitivities"
+                                                     : "shapes on the surface, radiation gains");
   std::vector<double> omega;
   for (const double lambda : solved.modes.lambda) omega.push_back(std::sqrt(lambda));
   io::SurfaceModes surface_modes = io::calc_surface_modes(run.comm, solved.modes.shapes, omega, found.body.surface);
+  fem::Derivatives derivatives;
+  if (run.job.sensitivities > 0 && !omega.empty()) {
+    const std::size_t count = std::min(solved.modes.lambda.size(), static_cast<std::size_t>(run.job.sensitivities));
+    derivatives = fem::calc_derivatives(run.comm, found.body.pieces.local, run.job.material, run.job.mass,
+                                        std::span(solved.modes.lambda).first(count), solved.modes.shapes);
+  }
   solved.modes.shapes.reset();
   bank::Bank bank;
   comm::Communicator(run.comm).agree([&] {
-    if (run.comm.is_root()) bank = make_bank(run.job, found, surface_modes);
+    if (run.comm.is_root()) bank = make_bank(run.job, found, surface_modes, derivatives);
   });
   run.log.end();
   return bank;

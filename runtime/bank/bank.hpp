@@ -13,6 +13,7 @@
 
 #include "runtime/bank/multipoles.hpp"
 #include "runtime/bank/quartic_energy.hpp"
+#include "runtime/bank/sensitivities.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/vector.hpp"
 
@@ -159,8 +160,9 @@ struct Bank {
   std::vector<double> facet_error_cents;
   Corrected corrected;  // empty: unknown; since 1.4
 
-  Multipoles multipoles;  // empty: air not solved; since 1.5
-  QuarticEnergy quartic;  // empty: linear motion; since 1.7
+  Multipoles multipoles;        // empty: air not solved; since 1.5
+  QuarticEnergy quartic;        // empty: linear motion; since 1.7
+  Sensitivities sensitivities;  // empty: not asked for; since 1.9
 
   std::optional<Packing> packing;  // banks read from packed files, since 2.0; not written by write_bank(), dropped by edits
 

@@ -501,6 +501,16 @@ Check check_material(const Bank& bank) {
           faults.take()};
 }
 
+Check check_sensitivities(const Bank& bank) {
+  const Sensitivities& s = bank.sensitivities;
+  Faults faults;
+  if (const std::string fault = find_fault(s, bank.vertex_count(), bank.mode_count()); !fault.empty()) faults.add("{}", fault);
+  return {"sensitivities",
+          fmt::format("{} modes, {} pairs, {} parameters", s.count, s.column_count() - s.count,
+                      s.by_parameter.size() / std::max<std::size_t>(s.count, 1)),
+          faults.take()};
+}
+
 Check check_solve(const Bank& bank) {
   Faults faults;
   const Counts& counts = bank.counts;
@@ -538,6 +548,7 @@ std::vector<Check> calc_checks(const Bank& bank) {
   }
   checks.push_back(check_error_bars(bank));
   for (Check& check : check_proof(bank)) checks.push_back(std::move(check));
+  if (!bank.sensitivities.is_empty()) checks.push_back(check_sensitivities(bank));
   if (bank.packing) checks.push_back(check_packing(bank));
   return checks;
 }

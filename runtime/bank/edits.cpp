@@ -145,6 +145,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
   else
     scale_size(edited.multipoles, g);
   scale_energy(edited.quartic, s, k, g);
+  for (double& x : edited.sensitivities.scale) x /= g * g * g;
   const Multipoles& air = edited.multipoles;
   edited.material.young_modulus_pa *= k;
   edited.material.density_kg_m3 *= s;

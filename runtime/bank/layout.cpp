@@ -87,6 +87,32 @@ void add_nonlinear_fields(const QuarticEnergy& energy, const FileForm& form, std
   fields.push_back({"nonlinear/thickness_m", "<f8", {}, "m", "by which amplitudes are judged", &energy.thickness_m});
 }
 
+/// Fields since version 1.9.
+void add_sensitivity_fields(const Sensitivities& s, const FileForm& form, std::vector<Field>& fields) {
+  const std::uint64_t columns = s.column_count(), sites = s.site_count();
+  fields.insert(
+      fields.end(),
+      {{"sensitivity/modes", "<i4", {columns, 2}, "1", "mode of the column, twice, or two near modes that a cut mixes", s.modes.data()},
+       {"sensitivity/scale", "<f8", {columns}, "cent mm^-1 m^-2", "of one integer step", s.scale.data()},
+       {"sensitivity/density",
+        "<i2",
+        {sites, columns},
+        "sensitivity/scale",
+        "change of the frequency by removed material, per area",
+        s.density.data()},
+       {"sensitivity/vertex", "<i4", {sites}, "1", "of the site; vertices of sharp edges have a site for each side", s.vertex.data()},
+       {"sensitivity/normal", "<f4", {sites, 3}, "1", "outward", s.normal.data()},
+       {"sensitivity/area_m2", "<f4", {sites}, "m^2", "of the site", s.area_m2.data()},
+       {"sensitivity/doubtful", "|u1", {sites}, "1", "1 near inward edges and fixed nodes", s.doubtful.data()},
+       {"sensitivity/parameters", text_type(form.parameters), {}, "1", "JSON list of names", form.parameters.data()},
+       {"sensitivity/by_parameter",
+        "<f8",
+        {s.count, s.count > 0 ? s.by_parameter.size() / s.count : 0},
+        "1",
+        "d ln f / d ln parameter; of Poisson's ratios d ln f / d nu",
+        s.by_parameter.data()}});
+}
+
 /// Fields since version 1.1.
 void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>& fields) {
   const auto add_errors = [&](const char* name, const char* meaning, const std::vector<double>& cents) {
@@ -142,6 +168,7 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
   }
   if (!bank.multipoles.is_empty()) add_radiation_fields(bank.multipoles, form, fields);
   if (!bank.quartic.is_empty()) add_nonlinear_fields(bank.quartic, form, fields);
+  if (!bank.sensitivities.is_empty()) add_sensitivity_fields(bank.sensitivities, form, fields);
   if (!bank.proof) return;
   const Proof& proof = *bank.proof;
   const auto& rigid = proof.rigid_per_component;
@@ -261,12 +288,14 @@ FileForm make_file_form(const Bank& bank) {
   if (bank.proof) form.proof_method = pad_text(bank.proof->method);
   if (!bank.multipoles.is_empty()) form.radiation_method = pad_text(bank.multipoles.method);
   if (!bank.quartic.is_empty()) form.nonlinear_form = bank.quartic.is_of_points() ? "points" : "rows";
+  if (!bank.sensitivities.is_empty()) form.parameters = pad_text(bank.sensitivities.parameters);
   form.has_complete_below = bank.proof && bank.proof->complete_below_hz > 0.0;
   if (bank.shape_bytes == 1) form.narrow_shape.assign(bank.shape.begin(), bank.shape.end());  // range checked by find_faults()
   return form;
 }
 
 std::array<int, 2> find_version(const Bank& bank, bool is_packed) {
+  if (!bank.sensitivities.is_empty()) return is_packed ? std::array{2, 5} : std::array{1, 9};
   if (bank.element == "imported" || !bank.facet_error_cents.empty()) return is_packed ? std::array{2, 4} : std::array{1, 8};
   if (!bank.quartic.is_empty()) return is_packed ? std::array{2, 3} : std::array{1, 7};
   const bool is_mixed = !bank.multipoles.mixing.is_empty();

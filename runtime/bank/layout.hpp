@@ -37,6 +37,7 @@ struct FileForm {
   std::string supports;             // since 1.3, absent without supports
   std::string radiation_method;     // since 1.5, absent without multipoles
   std::string nonlinear_form;       // since 1.7, absent without a nonlinear energy: "rows" or "points"
+  std::string parameters;           // since 1.9, absent without sensitivities
   bool has_complete_below = false;  // since 1.4: Proof::complete_below_hz is present
   // Since 2.0: output of runtime/bank/packed in place of mesh and shapes. The bank has its Packing.
   bool is_packed = false;

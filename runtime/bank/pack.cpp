@@ -64,6 +64,7 @@ Bank drop_unused(const Bank& bank) {
   }
   for (Triangle& triangle : used.triangles)
     for (std::int32_t& v : triangle) v = moved[v];
+  for (std::int32_t& v : used.sensitivities.vertex) v = moved[v];
   return used;
 }
 
@@ -109,10 +110,11 @@ PackedSurface pack_surface(const Bank& original, bool keep_numbers) {
   for (const std::int32_t v : written.vertices) append_row(bank, v, shape);
   bank.shape = std::move(shape);
   packed::Surface surface = packed::read_surface(std::as_bytes(std::span(written.bytes)), "the packed surface");
+  std::vector<std::int32_t> moved(bank.vertex_count());
+  for (std::size_t v = 0; v < moved.size(); ++v) moved[written.vertices[v]] = static_cast<std::int32_t>(v);
+  for (std::int32_t& v : bank.sensitivities.vertex) v = moved[v];
   std::vector<std::uint8_t> order;
   if (keep_numbers) {
-    std::vector<std::int32_t> moved(bank.vertex_count());
-    for (std::size_t v = 0; v < moved.size(); ++v) moved[written.vertices[v]] = static_cast<std::int32_t>(v);
     order = packed::write_order(find_triangle_order(surface, written.triangles, bank.triangles, moved));
   }
   bank.triangles = surface.triangles;

@@ -141,6 +141,7 @@ class Allocator {
     if (has_group(seal_, "supports")) make_supports();
     if (has_group(seal_, "radiation")) make_radiation();
     if (has_group(seal_, "nonlinear")) make_nonlinear();
+    if (has_group(seal_, "sensitivity")) make_sensitivities();
     if (has_group(seal_, "proof")) make_proof();
   }
 
@@ -263,6 +264,23 @@ class Allocator {
     if (const std::string fault = find_size_fault(energy); energy.is_empty() || !fault.empty())
       throw InputError(fmt::format("{}: {}; write the bank again", name_, fault.empty() ? "nonlinear/modes names no mode" : fault));
   }
+  void make_sensitivities() const {
+    Sensitivities& s = bank_.sensitivities;
+    const std::uint64_t columns = find_rows("sensitivity/modes"), sites = find_rows("sensitivity/vertex");
+    s.count = find_rows("sensitivity/by_parameter");
+    const Extent& values = get_extent(seal_, "sensitivity/by_parameter", name_);
+    const std::uint64_t parameters = values.shape.size() == 2 ? values.shape[1] : 0;
+    if (columns == 0) throw InputError(name_ + ": sensitivity/modes is empty; write the bank again");
+    make_table("sensitivity/modes", "<i4", {columns, 2}, s.modes, columns);
+    make_table("sensitivity/scale", "<f8", {columns}, s.scale, columns);
+    make_table("sensitivity/density", "<i2", {sites, columns}, s.density, sites * columns);
+    make_table("sensitivity/vertex", "<i4", {sites}, s.vertex, sites);
+    make_table("sensitivity/normal", "<f4", {sites, 3}, s.normal, sites);
+    make_table("sensitivity/area_m2", "<f4", {sites}, s.area_m2, sites);
+    make_table("sensitivity/doubtful", "|u1", {sites}, s.doubtful, sites);
+    make_table("sensitivity/by_parameter", "<f8", {s.count, parameters}, s.by_parameter, s.count * parameters);
+    make_text("sensitivity/parameters", form_.parameters);
+  }
   void make_proof() const {
     Proof& proof = bank_.proof.emplace();
     make_list("proof/cut_hz", "<f8", proof.cut_hz);
@@ -373,6 +391,7 @@ Bank finish(Loaded&& loaded, const std::string& name) {
     bank.multipoles = {};  // bank without modes
   else
     bank.multipoles.method = trim(form.radiation_method);
+  bank.sensitivities.parameters = trim(form.parameters);
   if (const std::string form_name = trim(form.nonlinear_form);
       !bank.quartic.is_empty() && form_name != (bank.quartic.is_of_points() ? "points" : "rows"))
     throw InputError(fmt::format("{}: nonlinear/form is \"{}\", and its arrays are those of the form \"{}\"; write the bank again", name,

@@ -59,6 +59,7 @@ void select_modes(Bank& bank, const std::vector<std::size_t>& chosen) {
   select_values(bank.corrected.correction, chosen);
   if (!bank.multipoles.is_empty()) bank.multipoles = select_multipoles(bank.multipoles, chosen);
   bank.quartic = select_coupled(bank.quartic, chosen);
+  bank.sensitivities = select_sensitive(bank.sensitivities, chosen);
   select_values(bank.supports.reaction, chosen, 6 * bank.supports.count());
   select_values(bank.supports.energy, chosen, bank.supports.count());
 }

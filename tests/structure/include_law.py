@@ -44,7 +44,7 @@ RULES = {
     "runtime/base": ([], ["fmt", "hwy", "openssl", "rapidjson"]),
     "runtime/material": (["runtime/base"], ["fmt"]),
     "runtime/bank/packed": (["runtime/base"], ["deflate", "eigen", "fmt", "stb"]),
-    "runtime/bank": (["runtime/base", "runtime/material"], ["fmt", "hdf5"]),
+    "runtime/bank": (["runtime/base", "runtime/material"], ["eigen", "fmt", "hdf5"]),
     "runtime/bank/mounting": (["runtime/base", "runtime/material"], ["fmt"]),
     "runtime/events": (["runtime/base"], ["fmt"]),
     "runtime/acoustics/radiation": (["runtime/base", "runtime/bank"], []),

@@ -110,6 +110,40 @@ class Bank:
         return steps / largest if largest > 0 and scale != 0 else numpy.zeros_like(steps)
 
 
+class Sensitivities:
+    """Densities of a bank's lowest modes over its sites (docs/bank-format.md)."""
+
+    def __init__(self, bank):
+        try:
+            with bank.open() as file:
+                if "sensitivity" not in file:
+                    raise InputError(f'{bank.path}: has no sensitivities; compute it with "sensitivities": 30 in the job')
+                group = file["sensitivity"]
+                self.count = len(group["by_parameter"])
+                self.density = group["density"][:, : self.count] * group["scale"][: self.count]
+                self.vertex, self.normal, self.doubtful = (group[name][:] for name in ("vertex", "normal", "doubtful"))
+        except (OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
+            raise InputError(f"{bank.path}: the sensitivities cannot be read ({error}); run carillon-bank check on it") from None
+        sites = len(self.vertex)
+        if self.density.shape != (sites, self.count) or self.normal.shape != (sites, 3) or self.doubtful.shape != (sites,):
+            raise InputError(f"{bank.path}: the arrays of sensitivity/ disagree; run carillon-bank check on it")
+        if not sites or self.vertex.min() < 0 or self.vertex.max() >= len(bank.vertices):
+            raise InputError(f"{bank.path}: a site is of no vertex; run carillon-bank check on it")
+
+    def find_sites(self, bank):
+        """(T, 3) the site of each corner: of those of its vertex, the one whose normal is nearest to the triangle's."""
+        corners = bank.vertices[bank.triangles]
+        normal = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        order = numpy.argsort(self.vertex, kind="stable")
+        first = numpy.searchsorted(self.vertex[order], bank.triangles)
+        best, most = order[numpy.minimum(first, len(order) - 1)], numpy.full(bank.triangles.shape, -numpy.inf)
+        for step in range(int(numpy.bincount(self.vertex).max())):
+            site = order[numpy.minimum(first + step, len(order) - 1)]
+            along = numpy.where(self.vertex[site] == bank.triangles, (self.normal[site] * normal[:, None, :]).sum(axis=2), -numpy.inf)
+            best, most = numpy.where(along > most, site, best), numpy.maximum(along, most)
+        return best
+
+
 class Multipoles:
     """The group radiation/ of a bank: one order and (order + 1)^2 finite coefficients per mode."""
 

@@ -12,9 +12,6 @@ def draw_modes(bank, numbers, up):
     used = numpy.unique(triangles)
     place = bank.vertices[used]
     size = numpy.linalg.norm(place.max(axis=0) - place.min(axis=0))
-    extent = place.max(axis=0) - place.min(axis=0)
-    flat = extent[up] < 0.25 * max(extent)
-    view = picture.View(up, place, 28, 34 if flat else 14)
     deformed = []
     for number in numbers:
         mode = bank.read_mode(number)
@@ -27,13 +24,23 @@ def draw_modes(bank, numbers, up):
         k = int(length[used].argmax())
         sign = 1.0 if mode[used][k] @ (place[k] - place.mean(axis=0)) >= 0 else -1.0
         deformed.append((bank.vertices + sign * 0.08 * size / largest * mode, length / largest))
+    note = "grey: undeformed; displacements exaggerated"
+    return draw_panels(bank, numbers, up, triangles, deformed, picture.make_colours(), ("at rest", "largest displacement"), note)
+
+
+def draw_panels(bank, numbers, up, triangles, deformed, colours, ends, note):
+    """A panel for each mode. deformed: vertices and colours, 0 to 1, of the surface `triangles` of each."""
+    outer, used = picture.drop_cavities(bank.vertices, bank.triangles), numpy.unique(triangles)
+    place = bank.vertices[numpy.unique(outer)]
+    extent = place.max(axis=0) - place.min(axis=0)
+    flat = extent[up] < 0.25 * max(extent)
+    view = picture.View(up, place, 28, 34 if flat else 14)
     seen = numpy.vstack([place] + [shape[used] for shape, _ in deformed]) @ view.axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
     columns, width, height = picture.choose_panels(len(numbers), (high[0] - low[0]) / max(high[1] - low[1], 0.05 * (high[0] - low[0])))
     rows = math.ceil(len(numbers) / columns)
     canvas = numpy.full((rows * height + picture.LEGEND, columns * width, 3), 255.0)
-    colours = picture.make_colours()
-    rest = picture.make_surface(bank.vertices, triangles)
+    rest = picture.make_surface(bank.vertices, outer)
     corners = numpy.vstack([place] + [shape[used] for shape, _ in deformed])
     bounds = numpy.column_stack([corners.min(axis=0), corners.max(axis=0)]).ravel()
     for index, (number, (shape, colour)) in enumerate(zip(numbers, deformed)):
@@ -61,6 +68,6 @@ def draw_modes(bank, numbers, up):
         renderer.AddActor2D(picture.make_text(label, 0.5, 42 / height, 26))
         row, column = divmod(index, columns)
         canvas[row * height : (row + 1) * height, column * width : (column + 1) * width] = picture.draw([renderer, above], width, height)
-    note = f"{bank.path.name}   ·   {bank.note}   ·   grey: undeformed; displacements exaggerated"
-    canvas[rows * height :] = picture.draw_legend(canvas.shape[1], picture.LEGEND, colours, ("at rest", "largest displacement"), note)
+    note = f"{bank.path.name}   ·   {bank.note}   ·   {note}"
+    canvas[rows * height :] = picture.draw_legend(canvas.shape[1], picture.LEGEND, colours, ends, note)
     return canvas

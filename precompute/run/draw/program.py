@@ -9,7 +9,7 @@ import sys
 
 from common import STANDARD_OUTPUT, InputError, SystemError_, printable
 from display import open_display
-from inputs import Bank, Motion, Multipoles, Trajectory
+from inputs import Bank, Motion, Multipoles, Sensitivities, Trajectory
 
 
 def parse_factor(text):
@@ -82,12 +82,18 @@ class Parser(argparse.ArgumentParser):
 def run(version):
     parser = Parser(prog="carillon-draw", description="Draws mode banks, simulated scenes and simulations.")
     parser.add_argument("--version", action="version", version=f"carillon-draw {version}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="modes|directivity|scene|motion", parser_class=Parser)
+    commands = parser.add_subparsers(
+        dest="command", required=True, metavar="modes|sensitivities|directivity|scene|motion", parser_class=Parser
+    )
     modes_words = commands.add_parser("modes", help="modes of a bank as deformed bodies", allow_abbrev=False)
     directivity_words = commands.add_parser("directivity", help="far-field level of each mode by direction", allow_abbrev=False)
+    sensitivity_words = commands.add_parser(
+        "sensitivities", help="where removed material raises or lowers the frequency of each mode", allow_abbrev=False
+    )
     modes_words.add_argument("bank", metavar="BANK")
+    sensitivity_words.add_argument("bank", metavar="BANK", help='of a job with "sensitivities"')
     directivity_words.add_argument("bank", metavar="BANK", help="with multipoles, as carillon-precompute --radiate writes it")
-    for command in (modes_words, directivity_words):
+    for command in (modes_words, sensitivity_words, directivity_words):
         command.add_argument("-o", "--output", required=True, type=pathlib.Path, metavar="OUT.png")
         command.add_argument("--modes", metavar="1,2,3", help="mode numbers, from 1 [the first three]")
         command.add_argument("--up", choices="xyz", default="y", help="axis of the mesh that points up [y]")
@@ -102,7 +108,7 @@ def run(version):
     motion_words.add_argument("--colour", choices=["speed", "displacement"], default="speed", help="quantity shown by colours [speed]")
     motion_words.add_argument("--up", choices="xyz", default="z", help="axis that points up [z]")
     motion_words.add_argument("--frames", type=pathlib.Path, metavar="DIR", help="write all frames to this folder, 00001.png and so on")
-    for command in (modes_words, directivity_words, scene_words, motion_words):
+    for command in (modes_words, sensitivity_words, directivity_words, scene_words, motion_words):
         command.add_argument("--result", type=pathlib.Path, metavar="FILE", help="write the outcome to this file, a JSON object")
     arguments = parser.parse_args()
 
@@ -117,7 +123,10 @@ def run(version):
     else:
         bank = Bank(arguments.bank)
         air = Multipoles(bank) if arguments.command == "directivity" else None
+        densities = Sensitivities(bank) if arguments.command == "sensitivities" else None
         numbers = parse_modes(arguments.modes, bank)
+        if densities and max(numbers) > densities.count:
+            raise InputError(f"{bank.path}: has sensitivities of the {densities.count} lowest modes, and not of mode {max(numbers)}")
     open_display()
     import picture  # VTK needs the display
 
@@ -125,6 +134,10 @@ def run(version):
         import modes as drawing
 
         image = drawing.draw_modes(bank, numbers, "xyz".index(arguments.up))
+    elif arguments.command == "sensitivities":
+        import sensitivities as drawing
+
+        image = drawing.draw_sensitivities(bank, densities, numbers, "xyz".index(arguments.up))
     elif arguments.command == "directivity":
         import directivity as drawing
 
