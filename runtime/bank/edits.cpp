@@ -19,6 +19,8 @@
 
 #include "runtime/bank/air.hpp"
 #include "runtime/bank/radiation_gain.hpp"
+#include "runtime/bank/select.hpp"
+#include "runtime/base/sort_order.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -77,6 +79,20 @@ void check(const Bank& bank, const Edits& edits) {
         "the bank is of a body of several materials, or of one that is not the same in all directions, which one density, stiffness or "
         "damping does not describe; change the materials of its job and compute the bank again");
   }
+}
+
+/// (m) factor of each eigenvalue by the cuts.
+std::vector<double> calc_cut_scales(const Bank& bank, const std::vector<Cut>& cuts) {
+  std::vector<double> scales(bank.mode_count(), 1.0);
+  if (cuts.empty()) return scales;
+  if (bank.sensitivities.is_empty())
+    throw InputError("the bank has no sensitivities, which cuts need; compute it again with \"sensitivities\": 30 in its job");
+  for (const Cut& cut : cuts)
+    if (!(cut.radius_m > 0.0 && cut.depth_m >= 0.0 && std::isfinite(cut.radius_m + cut.depth_m + norm(cut.at_m))))
+      throw InputError("a cut needs a place, a radius above 0 and a depth of 0 or more, in metres");
+  const std::vector<double> cents = calc_changes(bank, calc_depth(bank, cuts));
+  for (std::size_t m = 0; m < cents.size(); ++m) scales[m] = std::exp2(cents[m] / 600.0);
+  return scales;
 }
 
 /// True if the edit changes the ratio of wavelength in air to size.
@@ -138,6 +154,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
   const double shape_scale = 1.0 / std::sqrt(s * g * g * g);
   const double freq_scale = std::sqrt(eigenvalue_scale);
   const double area = calc_outer_area_m2(bank);
+  const std::vector<double> cut_scale = calc_cut_scales(bank, edits.cuts);
   Bank edited = bank;
   edited.packing.reset();
   if (changes_waves(edits))
@@ -159,15 +176,16 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
     edited.material.alpha1_s = edited.material.alpha2_per_s = 0.0;
   }
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
-    edited.eigenvalue_rad2_s2[m] *= eigenvalue_scale;
+    edited.eigenvalue_rad2_s2[m] *= eigenvalue_scale * cut_scale[m];
     edited.decay_per_s[m] = calc_decay(edited.damping, edited.material, edited.eigenvalue_rad2_s2[m]);
     if (!(edited.decay_per_s[m] >= 0.0) || !std::isfinite(edited.decay_per_s[m]))
       throw InputError(fmt::format("the damping makes mode {} ({:.5g} Hz) decay by {:.3g} 1/s, which is invalid; check its numbers", m + 1,
                                    edited.freq_hz(m), edited.decay_per_s[m]));
     if (Corrected& corrected = edited.corrected; !corrected.is_empty()) {
-      const double omega = 2.0 * std::numbers::pi * (corrected.freq_hz[m] *= freq_scale);
+      const double omega = 2.0 * std::numbers::pi * (corrected.freq_hz[m] *= freq_scale * std::sqrt(cut_scale[m]));
       corrected.decay_per_s[m] = calc_decay(edited.damping, edited.material, omega * omega);
     }
+    if (!edited.multipoles.is_empty()) edited.multipoles.freq_hz[m] *= std::sqrt(cut_scale[m]);
     edited.shape_scale[m] *= shape_scale;
     edited.radiation_gain[m] *= calc_radiation_gain(std::sqrt(edited.eigenvalue_rad2_s2[m]), shape_scale * g * g, area * g * g) /
                                 calc_radiation_gain(std::sqrt(bank.eigenvalue_rad2_s2[m]), 1.0, area);
@@ -199,7 +217,10 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
   if (edits.alphas) edited.provenance += fmt::format(R"(, "alpha1_s": {}, "alpha2_per_s": {})", (*edits.alphas)[0], (*edits.alphas)[1]);
   if (edits.damping) edited.provenance += format_law(*edits.damping);
   if (!describe_dropped(bank, edits).empty()) edited.provenance += R"(, "radiation": "dropped")";
+  if (!edits.cuts.empty()) edited.provenance += fmt::format(R"(, "cuts": {})", edits.cuts.size());
   edited.provenance += bank.provenance.empty() ? "}}" : fmt::format(R"(}}, "of": {}}})", bank.provenance);
+  if (!std::is_sorted(edited.eigenvalue_rad2_s2.begin(), edited.eigenvalue_rad2_s2.end()))  // a cut lets modes change places
+    select_modes(edited, base::find_sort_order(edited.eigenvalue_rad2_s2));
   return edited;
 }
 

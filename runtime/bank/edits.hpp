@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "runtime/bank/bank.hpp"
 
@@ -16,6 +17,7 @@ struct Edits {
   // Replacement of the bank's damping law; at most one of the two.
   std::optional<std::array<double, 2>> alphas{};  // Rayleigh: alpha1 [s], alpha2 [1/s]
   std::optional<Damping> damping{};               // "internal_friction", "caughey" or "loss_table", with its numbers
+  std::vector<Cut> cuts{};  // of the bank's surface, before the change of size; to first order, of the frequencies only
 };
 
 /// Parts of this bank that the edit drops, for its user; empty if none. Multipoles are dropped with another density or stiffness, which

@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -296,6 +297,51 @@ std::vector<double> calc_changes(const Bank& bank, std::span<const double> depth
     for (std::size_t m = first; m < last; ++m) changes[m] = values[static_cast<Eigen::Index>(m - first)] - find_cents(m);
   }
   return changes;
+}
+
+std::vector<double> calc_depth(const Bank& bank, std::span<const Cut> cuts) {
+  constexpr double kSameSide = 0.5;  // cosine of the largest angle between the normals of a spot
+  const Sensitivities& s = bank.sensitivities;
+  std::vector<double> depth_mm(s.site_count());
+  const auto find_normal = [&](std::size_t site) { return Vec3{s.normal[site][0], s.normal[site][1], s.normal[site][2]}; };
+  for (const Cut& cut : cuts) {
+    std::size_t nearest = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t site = 0; site < s.site_count(); ++site)
+      if (const double distance = norm(bank.vertices_m[s.vertex[site]] - cut.at_m); distance < least) least = distance, nearest = site;
+    for (std::size_t site = 0; site < s.site_count(); ++site) {
+      const double share = norm(bank.vertices_m[s.vertex[site]] - bank.vertices_m[s.vertex[nearest]]) / cut.radius_m;
+      if (share < 1.0 && dot(find_normal(site), find_normal(nearest)) > kSameSide)
+        depth_mm[site] += 1e3 * cut.depth_m * (1.0 - share * share) * (1.0 - share * share);
+    }
+  }
+  return depth_mm;
+}
+
+std::vector<float> calc_corner_density(const Bank& bank, std::size_t mode) {
+  const Sensitivities& s = bank.sensitivities;
+  std::vector<std::size_t> first(bank.vertex_count() + 1, 0), sites(s.site_count());  // by vertex
+  for (const std::int32_t v : s.vertex) ++first[v + 1];
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  std::vector<std::size_t> next(first.begin(), first.end() - 1);
+  for (std::size_t site = 0; site < s.site_count(); ++site) sites[next[s.vertex[site]]++] = site;
+  std::vector<float> density;
+  for (std::size_t t = 0; t < bank.triangles.size(); ++t) {
+    const Vec3 normal = find_normal(bank, static_cast<std::int32_t>(t));
+    for (const std::int32_t v : bank.triangles[t]) {
+      float found = std::numeric_limits<float>::quiet_NaN();
+      double most = -2.0;
+      for (std::size_t i = first[v]; i < first[v + 1]; ++i) {
+        const auto& [x, y, z] = s.normal[sites[i]];
+        const double along = dot(normal, Vec3{x, y, z});
+        if (!(along > most)) continue;
+        most = along;
+        found = s.doubtful[sites[i]] != 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(s.get_density(sites[i], mode));
+      }
+      density.push_back(found);
+    }
+  }
+  return density;
 }
 
 Sensitivities select_sensitive(const Sensitivities& sensitivities, std::span<const std::size_t> chosen) {

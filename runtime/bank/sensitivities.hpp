@@ -49,6 +49,19 @@ Sensitivities calc_sensitivities(const Bank& bank, const material::Elasticity& e
 /// First-order changes [cent] of the n modes by a cut of `depth_mm` (S), ascending within each group of near modes.
 std::vector<double> calc_changes(const Bank& bank, std::span<const double> depth_mm);
 
+/// A spot where material is removed: `depth_m` deep at the site nearest to `at_m`, smoothly less deep to `radius_m`, on that side only.
+struct Cut {
+  Vec3 at_m{};
+  double radius_m = 0.0;
+  double depth_m = 0.0;
+};
+
+/// Depth of all cuts together [mm] (S).
+std::vector<double> calc_depth(const Bank& bank, std::span<const Cut> cuts);
+
+/// Density of a mode at the corners of the triangles (T, 3) [cent / (mm m^2)]; NaN where doubtful.
+std::vector<float> calc_corner_density(const Bank& bank, std::size_t mode);
+
 /// Columns of the modes `chosen`, renumbered; empty unless the lowest modes stay the lowest.
 Sensitivities select_sensitive(const Sensitivities& sensitivities, std::span<const std::size_t> chosen);
 

@@ -81,6 +81,11 @@ export class Bank {
     Object.assign(this, { audio, id, modes, vertices_m, triangles, facts: rest });
     for (const name of ['name', 'mode_count', 'vertex_count', 'triangle_count', 'centre_m', 'mass_kg']) this[name] = facts[name];
   }
+  /** Change of a mode by cuts at the corners of the triangles, Float32Array(3 T) [cent / (mm m^2)], NaN where doubtful; empty without
+   * sensitivities. */
+  density(mode) {
+    return this.audio.worker.ask({ type: 'density', bank: this.id, mode });
+  }
   /** The shape of a mode at every vertex, Float32Array(3 V) [kg^-1/2]. */
   shape(mode) {
     return this.audio.worker.ask({ type: 'shape', bank: this.id, mode });
@@ -146,7 +151,7 @@ export class Body {
     return facts;
   }
   take(facts) {
-    for (const name of ['modes', 'mass_kg', 'centre_m', 'sounding_modes', 'limited_modes']) this[name] = facts[name];
+    for (const name of ['modes', 'cut_cents', 'mass_kg', 'centre_m', 'sounding_modes', 'limited_modes']) this[name] = facts[name];
     this.patches = facts.patch_m;
     this.model = facts.model;
   }

@@ -91,6 +91,10 @@ const obey = {
     wasm.call('web_calc_shape', bank, mode);
     return wasm.numbers();
   },
+  density({ bank, mode }) {
+    wasm.call('web_calc_density', bank, mode);
+    return wasm.numbers();
+  },
   /** Makes or remakes a body; returns its facts and its model's number. */
   async body({ body, bank, scene, edits }) {
     wasm.call('web_make_body', body, bank, scene, edits);

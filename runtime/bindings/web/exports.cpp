@@ -214,6 +214,12 @@ WEB_EXPORT(int, web_calc_shape)(int bank, int mode) {
     return 0;
   });
 }
+WEB_EXPORT(int, web_calc_density)(int bank, int mode) {
+  return run([&] {
+    numbers = get_workshop().calc_density(bank, mode);
+    return 0;
+  });
+}
 WEB_EXPORT(int, web_make_body)(int body, int bank, const char* scene, int scene_size, const char* edits, int edits_size) {
   return run([&] {
     text = get_workshop().make_body(body, bank, to_text(scene, scene_size), to_text(edits, edits_size));

@@ -37,7 +37,8 @@ namespace {
 using base::Json;
 
 constexpr base::Range kScale{0.0, std::numeric_limits<double>::infinity()};
-constexpr double kHardestPing = 1.0;                       // N s
+constexpr double kHardestPing = 1.0;  // N s
+constexpr std::size_t kMostCuts = 10000;
 constexpr std::size_t kMostEvents = std::size_t{1} << 30;  // bytes of a plan's events
 
 Json to_json(const Vec3& x) { return Json::array(x); }
@@ -110,6 +111,11 @@ std::optional<bank::Edits> read_edits(const bank::Bank& bank, std::string_view t
     edits.alphas.reset();
     changes = true;
   }
+  if (object.has("cuts"))
+    for (const std::vector<double>& row : object.number_rows("cuts", 5, kMostCuts)) {
+      edits.cuts.push_back({{row[0], row[1], row[2]}, row[3], row[4]});
+      changes = true;
+    }
   object.finish();
   scale_damping(damping_scale, bank, edits);
   return changes ? std::optional(edits) : std::nullopt;
@@ -211,6 +217,7 @@ std::string Workshop::add_bank(int bank, std::span<const std::byte> bytes, const
   facts.set("vertex_count", static_cast<std::int64_t>(b.vertex_count()));
   facts.set("triangle_count", static_cast<std::int64_t>(b.triangles.size())).set("bytes", static_cast<std::int64_t>(bytes.size()));
   facts.set("mass_kg", b.rigid.mass_kg).set("volume_m3", b.rigid.volume_m3).set("centre_m", to_json(b.rigid.centre_m));
+  facts.set("sensitive_modes", static_cast<std::int64_t>(b.sensitivities.count));
   facts.set("band_hz", Json::array(b.band_hz)).set("element", b.element).set("complete", b.complete);
   facts.set("completeness", bank::describe_completeness(b)).set("accuracy", bank::describe_accuracy(b));
   facts["material"].set("young_modulus_pa", b.material.young_modulus_pa).set("poisson_ratio", b.material.poisson_ratio);
@@ -233,16 +240,26 @@ std::vector<float> Workshop::calc_shape(int bank, int mode) const {
   return shape;
 }
 
+std::vector<float> Workshop::calc_density(int bank, int mode) const {
+  const bank::Bank& b = *find_bank(bank);
+  if (b.sensitivities.is_empty()) return {};
+  if (mode < 0 || static_cast<std::size_t>(mode) >= b.sensitivities.count)
+    throw InputError(fmt::format("mode {} has no sensitivities; the lowest {} modes have", mode, b.sensitivities.count));
+  return bank::calc_corner_density(b, static_cast<std::size_t>(mode));
+}
+
 std::string Workshop::make_body(int body, int bank, std::string_view scene, std::string_view edits) {
   const std::shared_ptr<const bank::Bank>& as_read = find_bank(bank);
   MadeBody made{.bank = bank, .scene = read_scene(scene, 1), .played = nullptr, .model = nullptr};
   scene::SceneBody& described = made.scene.bodies[0];
   Json modes;
+  std::vector<double> cut_cents;  // of the modes with sensitivities
   try {
     // As in scene::read_banks, for an edited bank.
     const std::optional<bank::Edits> wanted = read_edits(*as_read, edits);
     auto played = std::make_shared<bank::Bank>(
         bank::choose_frequencies(wanted ? bank::calc_edited(*as_read, *wanted) : *as_read, made.scene.frequencies));
+    if (wanted && !wanted->cuts.empty()) cut_cents = bank::calc_changes(*as_read, bank::calc_depth(*as_read, wanted->cuts));
     const std::vector<bank::HeardMode> heard = mounting::mount(*played, described.support);
     const radiation::PutGains put = radiation::put_gains(*played, made.scene.radiation);
     described.sphere_radius_m = put.sphere_radius_m;
@@ -269,7 +286,7 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
   facts.set("position_m", to_json(scene::calc_world_point(described.spec.initial, b.rigid.centre_m)));
   facts.set("rotation", Json::array(described.spec.initial.rotation)).set("centre_m", to_json(b.rigid.centre_m));
   facts.set("mass_kg", b.rigid.mass_kg).set("modes", std::move(modes)).set("sounding_modes", made.model->get_mode_count());
-  facts.set("limited_modes", static_cast<std::int64_t>(described.limited.modes));
+  facts.set("cut_cents", Json::array(cut_cents)).set("limited_modes", static_cast<std::int64_t>(described.limited.modes));
   facts.set("silence_pa", made.scene.quality.silence_pa.value_or(synth::BodySettings{}.silence_pa)).set("roughness_m", surface.roughness_m);
   facts.set("friction", surface.friction).set("seed_high", static_cast<std::int64_t>(surface.seed >> 32));
   facts.set("seed_low", static_cast<std::int64_t>(surface.seed & 0xffffffffU)).set("patch_m", list_patches(b));

@@ -50,9 +50,13 @@ class Workshop {
   /// Shape of a mode at every vertex, (V, 3) [kg^-1/2].
   std::vector<float> calc_shape(int bank, int mode) const;
 
+  /// Change of a mode by cuts, at the corners of the triangles (T, 3) [cent / (mm m^2)]; NaN where doubtful. Empty: no sensitivities.
+  std::vector<float> calc_density(int bank, int mode) const;
+
   /// Makes or replaces a body. `edits`: {"density_scale", "stiffness_scale", "size_scale", "damping_scale", "material": a name, "alphas":
-  /// [s, 1/s], "loss": tan phi}, all optional; damping_scale multiplies the resulting damping. Returns modes, mass, centre of mass, surface
-  /// and effects in the form of synth::BodySettings.
+  /// [s, 1/s], "loss": tan phi, "cuts": rows of place, radius and depth [m] (bank::Cut)}, all optional; damping_scale multiplies the
+  /// resulting damping. Returns modes, change of the lowest by cuts, mass, centre of mass, surface and effects in the form of
+  /// synth::BodySettings.
   std::string make_body(int body, int bank, std::string_view scene, std::string_view edits);
   void remove_body(int body) { bodies_.erase(body); }
   const MadeBody& get_body(int body) const;

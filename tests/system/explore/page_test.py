@@ -434,6 +434,43 @@ class PageTest(unittest.TestCase):
             self.assertEqual(len(said.splitlines()), 1)
             self.assertEqual(page.evaluate("document.getElementById('card-title').textContent"), "Cannot play this")
 
+    def test_cuts_change_frequencies_and_colours(self):
+        bar = {"length_m": 0.2, "width_m": 0.02, "thickness_m": 0.008}
+        job = {"shape": {"bar": bar}, "material": "steel", "band_hz": [20, 9000], "sensitivities": 4, "bank": "cut.hdf"}
+        (self.root / "cut.job.json").write_text(json.dumps(job))
+        run(BIN / "carillon-precompute", "-q", "cut.job.json", cwd=self.root)
+        run(BIN / "carillon", "explore", "cut.hdf", "-o", "cut", cwd=self.root)
+        page = self.open("cut")
+        modes = "carillon.player.bodies[0].sound.modes.map((mode) => mode.freq_hz)"
+        before = numpy.array(page.evaluate(modes))
+        page.evaluate("[...document.querySelectorAll('#gesture [role=radio]')].find((one) => one.textContent === 'Cut').click()")
+        page.wait_for("carillon.panel.body.shown.isColoured")
+        self.assertFalse(page.evaluate("document.getElementById('cuts').hidden"))
+        spot = page.evaluate("carillon.view.project(carillon.panel.body.shown.findWorldPoint(carillon.panel.body.places[0]))")
+        page.mouse("mousePressed", round(spot["x"]), round(spot["y"]), "left", clickCount=1, buttons=1)
+        page.mouse("mouseReleased", round(spot["x"]), round(spot["y"]), "left", clickCount=1)
+        page.wait_for("carillon.player.bodies[0].sound.cut_cents?.length === 4")
+        (x, y, z, radius, depth_m), *more = page.evaluate("carillon.panel.body.edit.cuts")
+        self.assertEqual(more, [])
+        # Worked out once more from the arrays of the bank; no two of these modes are near each other.
+        with h5py.File(self.root / "cut.hdf") as bank:
+            group = bank["sensitivity"]
+            place = bank["mesh/vertices"][:][group["vertex"][:]]
+            density, normal, area = group["density"][:] * group["scale"][:], group["normal"][:], group["area_m2"][:]
+        nearest = numpy.linalg.norm(place - [x, y, z], axis=1).argmin()
+        share = numpy.linalg.norm(place - place[nearest], axis=1) / radius
+        # Sites of one vertex on several sides of an edge are equally near.
+        expected = []
+        for site in numpy.flatnonzero(share == 0):
+            depth = numpy.where((share < 1) & (normal @ normal[site] > 0.5), depth_m * (1 - share**2) ** 2, 0.0)
+            expected.append((density * (area * 1e3 * depth)[:, None]).sum(axis=0)[:4])
+        cents = numpy.array(page.evaluate("carillon.player.bodies[0].sound.cut_cents"))
+        self.assertLess(min(numpy.abs(one - cents).max() for one in expected), 1e-3)
+        self.assertGreater(numpy.abs(cents).max(), 0.01)
+        numpy.testing.assert_allclose(numpy.array(page.evaluate(modes))[:4] / before[:4], 2 ** (cents / 1200), rtol=1e-6)
+        page.evaluate("document.getElementById('reset').click()")
+        page.wait_for(f"Math.abs({modes}[0] - {before[0]}) < 1e-6")
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)

@@ -36,6 +36,8 @@ function makeGeometry({ positions, normals, index }) {
   return geometry.setIndex(new THREE.BufferAttribute(index, 1));
 }
 
+const kLowers = [0.03, 0.16, 0.6], kRaises = [0.6, 0.03, 0.06], kNeutral = 0.85, kDoubtful = 0.25; // linear RGB
+
 const kBendVertex = `
 attribute vec3 bend;
 uniform float uBend;
@@ -78,10 +80,31 @@ export class ShownBody {
     return material;
   }
 
+  /** Colours the surface by the change of a mode by cuts, at the corners of the triangles: blue lowers, red raises, grey is doubtful. null:
+   * the look of its material. */
+  colourBy(density) {
+    this.isColoured = density !== null;
+    if (density) {
+      const { index, vertexOf } = this.corners;
+      this.coloured ??= {
+        geometry: makeGeometry(this.corners).setAttribute('color', new THREE.BufferAttribute(new Float32Array(3 * vertexOf.length), 3)),
+        material: new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.6, side: THREE.DoubleSide }),
+      };
+      const { color } = this.coloured.geometry.attributes, most = density.reduce((largest, x) => (Math.abs(x) > largest ? Math.abs(x) : largest), 1e-30);
+      for (let i = 0; i < index.length; ++i) {
+        const share = density[i] / most, end = share < 0 ? kLowers : kRaises, part = Math.sqrt(Math.abs(share));
+        for (let c = 0; c < 3; ++c) color.array[3 * index[i] + c] = Number.isNaN(share) ? kDoubtful : kNeutral + part * (end[c] - kNeutral);
+      }
+      color.needsUpdate = true;
+    }
+    const { geometry, material } = density ? this.coloured : this;
+    Object.assign(this.mesh, { geometry, material });
+  }
   setLook(look) {
     this.look = look;
     this.material.dispose();
-    this.material = this.mesh.material = this.makeMaterial(look);
+    this.material = this.makeMaterial(look);
+    if (!this.isColoured) this.mesh.material = this.material;
   }
   /** Draws without reflections and with few triangles, for motion without a graphics card. */
   setSketched(isSketched) {

@@ -14,7 +14,7 @@ const kKeyScrape = { radius: 0.05, hz: 1.7 }; // circle of the key S: radius / s
 
 export class Hands {
   /** gesture: 'strike', 'scrape' or 'press', the initial action of a press. holds(body), in throw mode: true for movable
-   * bodies, which like the arrow keys are left to the Thrower. */
+   * bodies, which like the arrow keys are left to the Thrower. cutRadius(body): of a cut [m]. */
   constructor(view, player) {
     Object.assign(this, { view, player, gesture: 'strike', pointers: new Map(), keys: new Map() });
     const { canvas } = view, on = (name, work) => canvas.addEventListener(name, (event) => work.call(this, event));
@@ -65,6 +65,11 @@ export class Hands {
       return;
     }
     Object.assign(pointer, { kind: 'touch', body: hit.body, place: hit, at: performance.now(), pressure: this.findPressure(event) });
+    if (this.gesture === 'cut') {
+      Object.assign(pointer, { kind: 'cut' });
+      this.cut(hit);
+      return;
+    }
     if (this.gesture === 'strike') void this.strike(hit, this.findSwing(pointer.trail) * (pointer.pressure ?? 1));
     else {
       this.select(hit);
@@ -112,9 +117,20 @@ export class Hands {
     } else if (pointer.kind === 'pan') {
       this.view.orbit.pan(dx / height, dy / height);
       this.turned();
+    } else if (pointer.kind === 'cut') {
+      const hit = this.view.pick(event.clientX, event.clientY);
+      if (hit?.body !== pointer.body || norm(subtract(hit.point, pointer.place.point)) < 0.5 * this.cutRadius(hit.body)) return;
+      pointer.place = hit;
+      this.cut(hit);
     } else {
       this.scrape(event, pointer);
     }
+  }
+
+  /** Removes material at a place, as the panel says. */
+  cut(place) {
+    this.select(place);
+    this.view.dispatchEvent(new CustomEvent('cut', { detail: place }));
   }
 
   scrape(event, pointer) {
@@ -217,6 +233,8 @@ export class Hands {
       this.turned();
     } else if (event.key === 'Enter' || event.key === ' ') {
       if (this.place && !event.repeat) void this.strike(this.place);
+    } else if (event.key.toLowerCase() === 'c') {
+      if (this.place) this.cut(this.place);
     } else if (event.key.toLowerCase() === 's' || event.key.toLowerCase() === 'p') {
       if (this.place && !event.repeat) this.beginKey(event.key.toLowerCase());
     } else if (/^[1-9]$/.test(event.key)) {

@@ -66,6 +66,7 @@ export class Panel {
     for (const [name, slider] of Object.entries(this.sliders)) slider.reset(body.edit[name]);
     find('material').value = body.edit.material;
     this.player.bodies.forEach((other, i) => other.sound.watch(i === index));
+    void this.showDensity();
     this.showModes();
     this.showFacts();
     find('view').setAttribute('aria-label', `${body.name}, ${body.sound.modes.length} modes`);
@@ -95,9 +96,48 @@ export class Panel {
     this.view.addEventListener('mallet', ({ detail: index }) => this.mallets.choose(index));
     makeSlider(find('speed'), (x) => 10 ** x, (v) => `${short(v)} m/s`, (v) => (this.player.speed_m_s = v));
     makeSlider(find('force'), (x) => 10 ** x, (v) => `${short(v)} N`, (v) => (this.player.force_n = v));
-    const gestures = ['strike', 'scrape', 'press'];
-    makeChoice(find('gesture'), ['Strike', 'Scrape', 'Press'], (index) => (this.hands.gesture = gestures[index]));
+    const gestures = ['strike', 'scrape', 'press'], isSensitive = this.player.bodies.some(({ bank }) => bank.facts.sensitive_modes > 0);
+    if (isSensitive) gestures.push('cut');
+    makeChoice(find('gesture'), gestures.map((name) => name[0].toUpperCase() + name.slice(1)), (index) => {
+      this.hands.gesture = gestures[index];
+      void this.showDensity();
+    });
+    if (isSensitive) this.makeCuts();
     this.player.addEventListener('done', ({ detail }) => this.showDone(detail));
+  }
+
+  // ---- cuts
+
+  makeCuts() {
+    [this.depth_mm, this.radius] = [0.05, 0.1]; // as the sliders begin
+    makeSlider(find('depth'), (x) => x, (v) => `${v.toFixed(3)} mm`, (v) => (this.depth_mm = v));
+    makeSlider(find('radius'), (x) => x, (v) => `${(100 * v).toFixed(0)} %`, (v) => (this.radius = v));
+    this.hands.cutRadius = (shown) => this.radius * shown.box.size * shown.size;
+    this.view.addEventListener('cut', ({ detail: place }) => {
+      const { body } = this;
+      if (!(body.bank.facts.sensitive_modes > 0)) return this.say(`the bank of ${body.name} has no sensitivities`);
+      body.edit.cuts.push([...body.shown.toMesh(place.point), this.radius * body.shown.box.size, 1e-3 * this.depth_mm]);
+      this.edit();
+    });
+  }
+
+  /** Colours the selected body by the density of the mode at hand while the gesture is to cut. */
+  async showDensity() {
+    const isCutting = this.hands.gesture === 'cut', { body } = this;
+    find('cuts').hidden = !isCutting;
+    for (const other of this.player.bodies) if (!isCutting || other !== body) other.shown.colourBy(null);
+    if (isCutting && body.bank.facts.sensitive_modes > 0) {
+      const mode = Math.min(this.cutMode ?? 0, body.bank.facts.sensitive_modes - 1), density = await body.bank.density(mode);
+      if (this.hands.gesture === 'cut' && this.body === body) body.shown.colourBy(density);
+      find('cut-mode').textContent = mode + 1;
+    }
+    this.showCutChange();
+    this.view.draw();
+  }
+  /** Change of the coloured mode by all cuts. */
+  showCutChange() {
+    const { edit, sound } = this.body, cents = sound.cut_cents?.[this.cutMode ?? 0] ?? 0, count = edit.cuts.length;
+    find('cut-change').textContent = count > 0 ? `${count} cut${count > 1 ? 's' : ''}: ${cents >= 0 ? '+' : ''}${cents.toFixed(2)} cents` : '';
   }
 
   goTo(index, isQuiet = false) {
@@ -137,7 +177,7 @@ export class Panel {
       groups.get(group).append(option(name, name));
     }
     select.append(...groups.values());
-    for (const body of this.player.bodies) body.edit = { material: '', size: 0, damping: 0, stiffness: 0, density: 0 };
+    for (const body of this.player.bodies) body.edit = { material: '', size: 0, damping: 0, stiffness: 0, density: 0, cuts: [] };
     const double = (x) => 2 ** x, changed = (name) => () => {
       this.body.edit[name] = Number(find(name).value);
       this.edit();
@@ -149,7 +189,7 @@ export class Panel {
       this.edit();
     });
     find('reset').addEventListener('click', () => {
-      this.body.edit = { material: '', size: 0, damping: 0, stiffness: 0, density: 0 };
+      this.body.edit = { material: '', size: 0, damping: 0, stiffness: 0, density: 0, cuts: [] };
       for (const slider of Object.values(this.sliders)) slider.reset();
       select.value = '';
       this.edit();
@@ -159,7 +199,7 @@ export class Panel {
   reset() {
     const { current } = this;
     this.player.bodies.forEach(({ edit }, index) => {
-      if (Object.values(edit).every((value) => !value)) return;
+      if (Object.values(edit).every((value) => !value || value.length === 0)) return;
       this.select(index, true, false);
       find('reset').click();
     });
@@ -168,7 +208,7 @@ export class Panel {
 
   /** Applies the values of the sliders, at most once every kEditS. */
   edit() {
-    const body = this.body, { material, size, damping, stiffness, density } = body.edit;
+    const body = this.body, { material, size, damping, stiffness, density, cuts } = body.edit;
     body.shown.setSize(2 ** size);
     const row = this.player.audio.materials.find(({ name }) => name === material);
     body.shown.setLook(row ? makeLook(row.name, row.group) : body.look);
@@ -177,6 +217,7 @@ export class Panel {
     body.editing = setTimeout(async () => {
       const wish = { size_scale: 2 ** size, damping_scale: 2 ** damping, stiffness_scale: 2 ** stiffness, density_scale: 2 ** density };
       if (material) wish.material = material;
+      if (cuts.length > 0) wish.cuts = cuts;
       try {
         await body.sound.edit(wish);
         find('edited').textContent = '';
@@ -185,6 +226,7 @@ export class Panel {
         this.say(error.message);
       }
       if (body === this.body) {
+        this.showCutChange();
         this.showModes();
         this.showFacts();
       }
@@ -259,6 +301,8 @@ export class Panel {
     this.spectrum.show(mode);
     this.showDecay(mode);
     const { body, current } = this;
+    this.cutMode = mode;
+    if (this.hands.gesture === 'cut') return this.showDensity();
     this.player.solo(current, mode);
     const shape = await body.bank.shape(mode);
     if (this.mode !== mode || this.body !== body) return;

@@ -214,6 +214,37 @@ TEST(Sensitivities, ReadBackAndArePackedAndScaledWithTheBank) {
   EXPECT_NEAR(calc_edited(bank, twice).sensitivities.scale[0], bank.sensitivities.scale[0] / 8.0, 1e-12 * bank.sensitivities.scale[0]);
 }
 
+TEST(Sensitivities, EditsCutSpotsOnOneSide) {
+  const double k = std::numbers::pi / kLengthM;
+  Bank bank = make_box(24, true, 2, k * k * kYoungPa / kDensity, 3.0, [k](std::size_t m, const Vec3& x) {
+    const double wave = static_cast<double>(m + 1) * k;
+    return Vec3{std::cos(wave * x[0]), 0.0, 0.0};
+  });
+  EXPECT_THROW((void)calc_edited(bank, {.cuts = {{example::kCornerM, 0.05, 1e-4}}}), InputError);
+  bank.sensitivities = calc_sensitivities(bank, make_elasticity(0.0), kDensity, 2, {});
+  const Vec3 top = example::kCornerM + Vec3{0.15, 0.01, 0.01};
+  const std::vector<Cut> cuts{{top, 0.05, 1e-4}};
+  const std::vector<double> depth = calc_depth(bank, cuts);
+  double volume_mm3 = 0.0;
+  for (std::size_t site = 0; site < depth.size(); ++site) {
+    const bool is_top = bank.sensitivities.normal[site][2] > 0.9F;
+    EXPECT_TRUE(depth[site] == 0.0 || is_top);
+    EXPECT_LE(depth[site], 0.1 + 1e-12);
+    volume_mm3 += 1e6 * bank.sensitivities.area_m2[site] * depth[site];
+  }
+  EXPECT_GT(volume_mm3, 50.0);  // of the 20 mm of its width: 20 mm times 0.1 mm times 16/15 of the radius
+  EXPECT_LT(volume_mm3, 107.0);
+  const Bank cut = calc_edited(bank, {.cuts = cuts});
+  // In the middle cos(k x) = 0 of mode 1: only strain, less material lowers it; of mode 2 only motion: it rises.
+  EXPECT_LT(cut.freq_hz(0), bank.freq_hz(0));
+  EXPECT_GT(cut.freq_hz(1), bank.freq_hz(1));
+  const std::vector<double> cents = calc_changes(bank, depth);
+  for (std::size_t m = 0; m < 2; ++m) EXPECT_NEAR(1200.0 * std::log2(cut.freq_hz(m) / bank.freq_hz(m)), cents[m], 1e-6);
+  const std::vector<float> corners = calc_corner_density(bank, 0);
+  ASSERT_EQ(corners.size(), 3 * bank.triangles.size());
+  EXPECT_EQ(find_faults(cut), std::vector<std::string>());
+}
+
 TEST(Sensitivities, ThatDisagreeAreRefused) {
   Bank good = example::make_bank(4, 6);
   good.sensitivities = calc_sensitivities(good, make_elasticity(0.3), kDensity, 4, {});
