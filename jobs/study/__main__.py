@@ -114,7 +114,7 @@ def run_study(options):
 def main():
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
-        programs.leave_run()
+        programs.leave_run("study")
         return run(sys.argv[1:])
     except InputError as error:
         code, text = 2, error

@@ -22,8 +22,8 @@ import time
 import answer
 import bodies
 import forecast
+import job_file
 import programs
-import scaling
 import targets
 from lab import Case, Lab
 from errors import InputError, RunError, printable
@@ -412,7 +412,7 @@ def read_packed_advice(path=None):
         return forecast.read_advice(pkgutil.get_data(__name__, "advice.json").decode())
     remedy = "tests/bench/study/run --write-advice FILE writes one"
     try:
-        return forecast.read_advice(scaling.read_text(path, "advice", remedy))
+        return forecast.read_advice(job_file.read_text(path, "advice", remedy))
     except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         raise InputError(f"{path}: {f'{error} is missing' if isinstance(error, KeyError) else error}; {remedy}") from None
 

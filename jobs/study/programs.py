@@ -20,10 +20,10 @@ def read_seconds(text):
     return value
 
 
-def leave_run():
-    """Inside an MPI run, replaces this process by `carillon study`, whose children start outside the run."""
+def leave_run(*words):
+    """Inside an MPI run, replaces this process by `carillon` with these words and the arguments; its children start outside the run."""
     if not {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"}.isdisjoint(os.environ):
-        os.execv(find_program(None, "carillon"), ["carillon", "study", *sys.argv[1:]])
+        os.execv(find_program(None, "carillon"), ["carillon", *words, *sys.argv[1:]])
 
 
 def find_program(given, name="carillon-precompute"):

@@ -2,7 +2,7 @@
 import copy
 import pathlib
 
-import scaling
+import job_file
 from errors import InputError
 
 SURFACES, MESHES = (".obj", ".stl", ".ply", ".off"), (".msh", ".vtu", ".mesh", ".node", ".ele", ".vtk", ".vtkhdf", ".hdf", ".h5")
@@ -75,7 +75,7 @@ def find_file(path, ending):
 
 
 def find_job(path):
-    job = scaling.read_job(path)
+    job = job_file.read_job(path)
     kinds = [key for key in ("body", "mesh") if key in job]
     if len(kinds) != 1:
         raise InputError(

@@ -3,7 +3,8 @@ import json
 import os
 import pathlib
 
-import scaling
+import job_file
+from errors import InputError
 
 QUANTITIES = ("flops", "messages", "bytes", "collectives", "collective_bytes")
 MAX_GROWTH = 0.05
@@ -37,23 +38,23 @@ def write(path, study):
         os.replace(fresh, path)
     except OSError as error:
         fresh.unlink(missing_ok=True)
-        raise scaling.InputError(f"{path}: cannot write the record: {error.strerror}") from None
+        raise InputError(f"{path}: cannot write the record: {error.strerror}") from None
 
 
 def read(path):
     """A record of write(). InputError for missing parts."""
     remedy = f"record it again with --record {path}"
-    record = scaling.parse(scaling.read_text(path, "record", remedy), path, remedy)
+    record = job_file.parse(job_file.read_text(path, "record", remedy), path, remedy)
     if (
         not isinstance(record, dict)
         or record.get("format") != FORMAT
         or not isinstance(record.get("job"), dict)
         or not isinstance(record.get("cases"), list)
     ):
-        raise scaling.InputError(f"{path}: not a record of a study; {remedy}")
+        raise InputError(f"{path}: not a record of a study; {remedy}")
     for number, case in enumerate(record["cases"], 1):
         if fault := find_fault(case):
-            raise scaling.InputError(f"{path}: case {number} of the record {fault}; {remedy}")
+            raise InputError(f"{path}: case {number} of the record {fault}; {remedy}")
     return record
 
 
@@ -83,7 +84,7 @@ def compare(recorded, cases):
     for old in recorded:
         new = found.get((old["nodes"], old["ranks"]))
         if new is None:
-            raise scaling.InputError(
+            raise InputError(
                 f"the record has a case of {old['nodes']} nodes on {old['ranks']} ranks, and the study has none: take the options it was"
                 " made with"
             )
@@ -98,7 +99,7 @@ def compare(recorded, cases):
 def check(record, study, options):
     """Raises HasGrown for growth; prints reductions."""
     if record["job"] != study.job:
-        raise scaling.InputError(f"{options.check}: the record is of another job than {study.job_file}; record it again with --record")
+        raise InputError(f"{options.check}: the record is of another job than {study.job_file}; record it again with --record")
     differences = compare(record["cases"], collect(study))
     lines = {True: [], False: []}
     for case, phase, quantity, before, now in differences:

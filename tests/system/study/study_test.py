@@ -18,6 +18,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "jobs/study"))
 sys.path.insert(0, str(ROOT / "tests/support"))
 import fixtures
+import job_file
 import scaling
 
 JOB = ROOT / "tests/system/study/job.json"
@@ -88,7 +89,7 @@ class Program(unittest.TestCase):
 
     def test_mesh_file_gets_strong_scaling_only_and_says_so(self):
         fixtures.copy("bar.msh", self.folder)
-        job = json.loads(scaling.strip_comments(JOB.read_text()))
+        job = json.loads(job_file.strip_comments(JOB.read_text()))
         job.pop("body")
         (self.folder / "mesh.json").write_text("// a mesh file\n" + json.dumps(job | {"mesh": "bar.msh"}))
         result = call(self.folder, "scaling", "mesh.json", "--quick", "-o", "meshed")
@@ -174,7 +175,7 @@ class Program(unittest.TestCase):
             self.assertNotIn("CPU s", result.stdout)
 
     def test_error_of_a_run_is_passed_on_with_its_code(self):
-        job = json.loads(scaling.strip_comments(JOB.read_text()))
+        job = json.loads(job_file.strip_comments(JOB.read_text()))
         (self.folder / "wrong.json").write_text(json.dumps(job | {"bnad_hz": [20, 100]}))
         result = call(self.folder, "scaling", "wrong.json", "--quick", "-o", "wrong")
         self.assertEqual(result.returncode, 2)
