@@ -29,7 +29,7 @@ carillon_component(EXCHANGE "banks as GLB, Faust and samples" runtime/exchange/c
   runtime/exchange/to_faust.cpp runtime/exchange/to_glb.cpp runtime/exchange/faust.hpp runtime/exchange/glb.hpp runtime/render/samples)
 carillon_component(SLURM "jobs in Slurm" jobs/queue/slurm jobs/cli/slurm.cpp)
 carillon_component(HEADS "listeners with a head" runtime/acoustics/head runtime/synth/head_ears.cpp)
-carillon_component(STUDIES "advice and scaling studies, carillon-study" jobs/study)
+carillon_component(STUDIES "advice, scaling studies and bodies matched to recordings: carillon-study, carillon-tune" jobs/study jobs/tune)
 
 # The component of a folder or file of the product, by its path from the root; empty: the core.
 function(carillon_find_component out path)

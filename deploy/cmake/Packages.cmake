@@ -30,9 +30,9 @@ if(CARILLON_SOFA)
 endif()
 
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_NAME carillon-precompute)
-set(CPACK_COMPONENT_PRECOMPUTE_DESCRIPTION "Vibration modes of solid objects: carillon-precompute, carillon-simulate, carillon-mesh, carillon-draw and the queue carillon")
+set(CPACK_COMPONENT_PRECOMPUTE_DESCRIPTION "Vibration modes of solid objects: carillon-precompute, carillon-simulate, carillon-mesh, carillon-draw, carillon-study, carillon-tune and the queue carillon")
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_DEPENDS
-  "carillon-runtime (= ${PROJECT_VERSION}), openmpi-bin, libopenblas0-serial, python3, python3-numpy, python3-h5py")
+  "carillon-runtime (= ${PROJECT_VERSION}), openmpi-bin, libopenblas0-serial, python3, python3-numpy, python3-h5py, python3-scipy")
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_RECOMMENDS python3-vtk9)
 
 if(TARGET carillon_python)

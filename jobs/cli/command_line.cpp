@@ -287,12 +287,9 @@ void add_validate(CLI::App& app, Shared& shared, Run& run) {
   set_work(*command, shared, run, options, run_validate);
 }
 
-void add_study(CLI::App& app, Shared& shared, Run& run) {
-  CLI::App* command = app.add_subcommand("study", "Studies: scaling JOB.json, advise BODY --cents 5; see carillon study --help");
-  command->prefix_command();
-  command->set_help_flag();
-  command->callback(
-      [&shared, &run, command] { run = [&shared, options = StudyOptions{command->remaining()}] { return run_study(shared, options); }; });
+/// For the list of commands only.
+void add_handed_over(CLI::App& app, Shared&, Run&) {
+  for (const HandedOver& one : kHandedOver) app.add_subcommand(std::string(one.command), std::string(one.help));
 }
 
 void add_report(CLI::App& app, Shared& shared, Run& run) {
@@ -380,7 +377,7 @@ Run parse_command_line(int argc, char** argv, Shared& shared) {
   app.add_flag("--json", shared.json, "One JSON document (from commands that keep running: one object per line)");
   app.set_version_flag("--version", base::describe("carillon"));
   for (const auto add : {add_hear, add_explore, add_materials, add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run,
-                         add_get, add_gc, add_verify, add_validate, add_study, add_report, add_bank_for})
+                         add_get, add_gc, add_verify, add_validate, add_handed_over, add_report, add_bank_for})
     add(app, shared, run);
   app.footer(kFooter);
   add_attempt(app, run);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <string_view>
 
 #include "jobs/cli/shared.hpp"
 
@@ -9,6 +10,15 @@ namespace carillon::cli {
 
 /// A parsed command; returns the exit code.
 using Run = std::function<int()>;
+
+/// A command that another program of this installation carries out.
+struct HandedOver {
+  std::string_view command, program, help;
+  bool keeps_command = false;  // the program takes the command as its first argument
+};
+inline constexpr HandedOver kHandedOver[] = {
+    {"study", "carillon-study", "Studies: scaling JOB.json, advise BODY --cents 5; see carillon study --help"},
+    {"match", "carillon-tune", "The material of a body from a recording: match JOB.json SOUND.wav; see carillon match --help", true}};
 
 /// Index of the command name, after the global options; argc if there is none.
 int find_command(int argc, char** argv);

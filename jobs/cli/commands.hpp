@@ -91,12 +91,6 @@ struct ValidateOptions {
 };
 int run_validate(Shared& shared, const ValidateOptions& options);
 
-/// carillon study: replaces this process by carillon-study.
-struct StudyOptions {
-  std::vector<std::string> words;
-};
-int run_study(Shared& shared, const StudyOptions& options);
-
 /// carillon report: the report of a bank.
 struct ReportOptions {
   std::string word;

@@ -29,20 +29,23 @@ int fail(bool json, const std::string& what, int code) {
   return code;
 }
 
-/// Passes the arguments after "study", including --help, to carillon-study; of those before, only --json.
-void hand_over_study(int argc, char** argv) {
+/// Passes the arguments after a command of another program, including --help, to it; of those before, only --json.
+void hand_over(int argc, char** argv) {
   const int at = find_command(argc, argv);
-  if (at == argc || std::string_view(argv[at]) != "study") return;
-  std::vector<std::string> rest(argv + at + 1, argv + argc);
-  if (std::any_of(argv + 1, argv + at, [](const char* word) { return std::string_view(word) == "--json"; })) rest.emplace_back("--json");
-  become("carillon-study", rest);
+  if (at == argc) return;
+  for (const HandedOver& one : kHandedOver) {
+    if (argv[at] != one.command) continue;
+    std::vector<std::string> rest(argv + at + (one.keeps_command ? 0 : 1), argv + argc);
+    if (std::any_of(argv + 1, argv + at, [](const char* word) { return std::string_view(word) == "--json"; })) rest.emplace_back("--json");
+    become(std::string(one.program), rest);
+  }
 }
 
 int run(int argc, char** argv) {
   Shared shared;
   shared.json = std::any_of(argv, argv + argc, [](const char* word) { return std::string_view(word) == "--json"; });
   try {
-    hand_over_study(argc, argv);
+    hand_over(argc, argv);
     return parse_command_line(argc, argv, shared)();
   } catch (const InputError& error) {
     return fail(shared.json, error.what(), kExitInput);

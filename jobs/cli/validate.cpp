@@ -1,4 +1,4 @@
-// carillon validate and carillon study: replace this process by another program.
+// carillon validate: replaces this process by another program.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -19,12 +19,6 @@ int run_validate(Shared& shared, const ValidateOptions& options) {
   const bool is_file = std::filesystem::is_regular_file(options.word, error);
   const bool is_simulation = is_file && job::is_simulation(base::read_file(options.word, "job file", store::kMaxJobBytes));
   become(is_simulation ? "carillon-simulate" : "carillon-precompute", arguments);
-}
-
-int run_study(Shared& shared, const StudyOptions& options) {
-  std::vector<std::string> arguments = options.words;
-  if (shared.json) arguments.emplace_back("--json");
-  become("carillon-study", arguments);
 }
 
 }  // namespace carillon::cli

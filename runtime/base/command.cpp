@@ -40,8 +40,8 @@ constexpr double kKillPatienceS = 5.0;   // wait after SIGKILL
 constexpr const char* kHelperFolder = "libexec/carillon";
 constexpr const char* kDataFolder = "share/carillon";
 /// Programs of components, which a build may leave out (docs/components.md).
-constexpr std::array<std::array<std::string_view, 2>, 2> kComponentPrograms{
-    {{"carillon-simulate", "SIMULATION"}, {"carillon-study", "STUDIES"}}};
+constexpr std::array<std::array<std::string_view, 2>, 3> kComponentPrograms{
+    {{"carillon-simulate", "SIMULATION"}, {"carillon-study", "STUDIES"}, {"carillon-tune", "STUDIES"}}};
 constexpr const char* kOomScore = "500";  // out of 1,000
 
 struct Pipe {

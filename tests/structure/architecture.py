@@ -12,7 +12,7 @@ import sys
 sys.dont_write_bytecode = True
 from include_law import LAW
 
-SEPARATE = {"jobs/study"}  # a Python program, outside the law
+SEPARATE = {"jobs/study", "jobs/tune"}  # Python programs, outside the law
 ROW = re.compile(r"^\| `([a-z_/]+)` \| ([^|]*) \| ([^|]*) \| ([^|]*) \|$", re.M)
 WORDS_AT_MAX = 14
 

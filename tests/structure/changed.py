@@ -31,6 +31,7 @@ PROGRAMS = {
     "carillon-simulate": ["precompute/simulation"],
     "carillon-draw": ["precompute/run"],
     "carillon-study": ["jobs/study", *SOLVER],
+    "carillon-tune": ["jobs/tune", *SOLVER],
     "carillon": ["jobs/cli", "precompute/simulation", "runtime/render", *SOLVER],
     "import carillon": ["runtime/bindings", *SOLVER],
     "share/carillon/web": ["runtime/bindings"],

@@ -38,7 +38,7 @@ DEV = {
     "free_of": "mpi|petsc",
 }
 PRECOMPUTE = {
-    "files": ["bin/carillon", "bin/carillon-precompute", "bin/carillon-mesh", "bin/carillon-draw", "bin/carillon-study"],
+    "files": [f"bin/carillon{name}" for name in ("", "-precompute", "-mesh", "-draw", "-study", "-tune")],
     "needs": "libpetsc-real",
     "free_of": "nothing",
 }

@@ -1,0 +1,61 @@
+"""carillon-tune: bodies matched to recordings.
+
+    carillon-tune match JOB.json SOUND.wav|PEAKS.csv [-o FOLDER] [--mass 0.2126kg] [--tolerance 0.05mm]
+
+Exit codes: 0 done, 2 bad input, 3 a solve failed, 4 system error.
+"""
+import argparse
+import json
+import os
+import signal
+import sys
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: threads gain nothing on matrices of this size
+
+try:
+    import match
+except ImportError as error:
+    print(f"carillon-tune: error: {error}; install python3-numpy, python3-scipy and python3-h5py", file=sys.stderr)
+    sys.exit(4)
+import programs
+from errors import InputError, Parser, RunError, printable
+
+VERSION = "unknown"  # set by the build
+
+
+def make_parser():
+    parser = Parser(prog="carillon-tune", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--version", action="version", version=f"carillon-tune {VERSION}")
+    commands = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
+    match.add_command(commands)
+    return parser
+
+
+def run(arguments):
+    options = make_parser().parse_args(arguments)
+    text, document = options.run(options)
+    print(json.dumps(document, indent=2) if options.json else text)
+    return 0
+
+
+def main():
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    try:
+        programs.leave_run()
+        return run(sys.argv[1:])
+    except InputError as error:
+        code, text = 2, error
+    except RunError as error:
+        code, text = error.code, error
+    except OSError as error:
+        code, text = 4, error
+    except KeyboardInterrupt:
+        return 130
+    if "--json" in sys.argv[1:]:
+        print(json.dumps({"error": str(text), "exit_code": code}, indent=2))
+    print(f"carillon-tune: error: {printable(text)}", file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,103 @@
+"""Solves a job with carillon-precompute in a temporary folder and reads its bank; follows modes from one solve to another."""
+import concurrent.futures
+import dataclasses
+import json
+import os
+import pathlib
+import tempfile
+
+import h5py
+import numpy
+import scipy.optimize
+import scipy.spatial
+
+import measuring
+from errors import InputError
+
+# What decides the frequencies; the air, large motion, queue and files of a job do not.
+KEYS = ("mesh", "mesh_scale", "shape", "body", "accuracy_cents", "material", "band_hz", "max_modes", "element", "mass", "fixed", "solver")
+BAR_SHARES = {0: 1 / 2, 1: 1 / 3}  # of the mesh's bar, by modes/correction: docs/bank-format.md
+MAX_VERTICES = 2000  # sampled to compare shapes
+
+
+@dataclasses.dataclass(frozen=True)
+class Solution:
+    """A solved body of m modes, in ascending order of corrected_hz, and V surface vertices."""
+
+    freq_hz: numpy.ndarray  # (m) of the mesh
+    corrected_hz: numpy.ndarray  # (m) of the body
+    bar_cents: numpy.ndarray  # (m) of corrected_hz; inf: unknown
+    decay_per_s: numpy.ndarray  # (m)
+    shapes: numpy.ndarray  # (m, V, 3) kg^-1/2
+    vertices: numpy.ndarray  # (V, 3) m
+    mass_kg: float
+    volume_m3: float
+    job: dict  # as resolved: the material in numbers
+
+
+class Solver:
+    """job_file: for messages and relative paths."""
+
+    def __init__(self, program, job_file, timeout_s=3600):
+        self.program, self.job_file, self.timeout_s = program, pathlib.Path(job_file), timeout_s
+        measuring.run_part([program, "--validate", self.job_file.resolve()], self.job_file.resolve().parent, self.job_file)
+
+    def solve(self, job):
+        """The Solution of a job; RunError of carillon-precompute."""
+        job = {key: job[key] for key in KEYS if key in job} | {"shapes": "exact", "bank": "bank.hdf"}
+        base = self.job_file.resolve().parent
+        if "mesh" in job:
+            job["mesh"] = str(base / job["mesh"])
+        if "surface" in job.get("body", {}):
+            job["body"] = job["body"] | {"surface": str(base / job["body"]["surface"])}
+        with tempfile.TemporaryDirectory(prefix="carillon-tune-") as name:
+            folder = pathlib.Path(name)
+            (folder / "job.json").write_text(json.dumps(job))
+            measuring.run_part([self.program, "-q", "job.json"], folder, self.job_file, timeout_s=self.timeout_s)
+            return read_bank(folder / "bank.hdf", self.job_file)
+
+    def solve_all(self, jobs):
+        """Their Solutions, as many at once as there are cores."""
+        with concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+            return list(pool.map(self.solve, jobs))
+
+
+def read_bank(path, job_file):
+    """The Solution in a bank of exact shapes; `<bank>.resolved.json` lies next to it. InputError if it has no shapes."""
+    job = json.loads(pathlib.Path(f"{path}.resolved.json").read_text())
+    with h5py.File(path) as bank:
+        modes = bank["modes"]
+        if "shape" not in modes or "corrected_frequency_hz" not in modes:
+            raise InputError(f"{job_file}: this body has no mesh; give a job with a mesh, a shape or a surface")
+        corrected = modes["corrected_frequency_hz"][:]
+        order = numpy.argsort(corrected)
+        mesh_bars, shares = modes["discretisation_error_cents"][:], modes["correction"][:]
+        # The bar of the k-th frequency may be that of its neighbours; the bar of the mode itself is no longer.
+        own = mesh_bars * numpy.array([BAR_SHARES.get(int(reason), numpy.inf) for reason in shares])
+        bars = numpy.fmin(modes["corrected_error_cents"][:], own)
+        shapes = numpy.moveaxis(modes["shape"][:].astype(float), 1, 0) * modes["shape_scale"][:][:, None, None]
+        return Solution(
+            modes["frequency_hz"][:][order],
+            corrected[order],
+            bars[order],
+            modes["corrected_decay"][:][order],
+            shapes[order],
+            bank["mesh/vertices"][:],
+            float(bank["rigid/mass_kg"][()]),
+            float(bank["rigid/volume_m3"][()]),
+            job,
+        )
+
+
+def follow(first, second):
+    """(m) for each mode of a Solution the mode of another with its shape, by the modal assurance criterion (Allemang and Brown 1982), each
+    taken once. Vertices of different meshes are compared at equal places of the two bounding boxes. `second` needs as many modes or more.
+    """
+    chosen = numpy.linspace(0, len(first.vertices) - 1, min(len(first.vertices), MAX_VERTICES)).astype(int)
+    other = chosen
+    if len(first.vertices) != len(second.vertices):
+        places = [(v - v.min(axis=0)) / numpy.maximum(numpy.ptp(v, axis=0), 1e-12) for v in (first.vertices, second.vertices)]
+        other = scipy.spatial.cKDTree(places[1]).query(places[0][chosen])[1]
+    rows = [(s.shapes[:, at].reshape(len(s.shapes), -1)) for s, at in ((first, chosen), (second, other))]
+    rows = [row / numpy.linalg.norm(row, axis=1, keepdims=True) for row in rows]
+    return scipy.optimize.linear_sum_assignment(-((rows[0] @ rows[1].T) ** 2))[1]

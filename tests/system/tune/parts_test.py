@@ -1,0 +1,131 @@
+#!/usr/bin/python3
+"""Parts of carillon-tune on made sounds, frequencies and decays: peaks and what spoils them, assignment, choice of the damping law."""
+import math
+import pathlib
+import sys
+import unittest
+
+import numpy
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "jobs/tune"), str(ROOT / "jobs/study")]
+import constants
+import losses
+import sound
+
+RATE = 44100.0
+MODES = ((440.0, 4.0, 1.0), (1213.0, 9.0, 0.8), (2377.0, 15.0, 0.5), (3929.0, 24.0, 0.6), (5869.0, 40.0, 0.4))  # Hz, 1/s, amplitude
+
+
+def strike(modes=MODES, seconds=1.5, noise=1e-3, seed=1):
+    """Samples of damped sines after 0.1 s of silence, with noise."""
+    rng = numpy.random.default_rng(seed)
+    time_s = numpy.arange(round(seconds * RATE)) / RATE
+    wave = sum(a * numpy.exp(-d * time_s) * numpy.sin(2 * math.pi * f * time_s + k) for k, (f, d, a) in enumerate(modes))
+    wave = numpy.concatenate([numpy.zeros(round(0.1 * RATE)), wave])
+    return wave + noise * rng.normal(size=len(wave))
+
+
+def add_room(samples, t60_s, level_db, seed):
+    """With decaying noise as the response of a room."""
+    rng = numpy.random.default_rng(seed)
+    count = round(t60_s * RATE)
+    response = rng.normal(size=count) * 10 ** (-3 * numpy.arange(count) / count)
+    response *= 10 ** (level_db / 20) / numpy.linalg.norm(response)
+    return samples + numpy.convolve(samples, response)[: len(samples)]
+
+
+class Hearing(unittest.TestCase):
+    def check(self, hearing, modes=MODES, decay_share=0.05):
+        self.assertEqual(len(hearing.peaks), len(modes), hearing)
+        for peak, (hz, decay, _) in zip(hearing.peaks, modes):
+            undamped = math.hypot(hz, decay / (2 * math.pi))
+            self.assertLess(abs(1200 * math.log2(peak.freq_hz / undamped)), 0.5)
+            self.assertLess(abs(peak.decay_per_s / decay - 1), decay_share, peak)
+
+    def test_modes_of_a_strike_in_noise(self):
+        self.check(sound.hear(strike(noise=0.05), RATE))
+
+    def test_standard_errors_hold_in_noise(self):
+        inside = total = 0
+        for seed in range(8):
+            for peak, (hz, decay, _) in zip(sound.hear(strike(noise=0.05, seed=seed), RATE).peaks, MODES):
+                undamped = math.hypot(hz, decay / (2 * math.pi))
+                inside += int(abs(peak.freq_hz - undamped) < 2 * peak.sd_hz) + int(abs(peak.decay_per_s - decay) < 2 * peak.sd_per_s)
+                total += 2
+        self.assertEqual(total, 80)
+        self.assertGreater(inside, 0.88 * total)
+
+    def test_close_pair_is_two_modes(self):
+        pair = (*MODES[:2], (1219.0, 9.0, 0.6), *MODES[2:])
+        self.check(sound.hear(strike(pair), RATE), pair)
+
+    def test_mains_hum_is_left_out_and_said(self):
+        samples = strike()
+        for hz, size in ((50, 0.05), (150, 0.03)):
+            samples += size * numpy.sin(2 * math.pi * hz * numpy.arange(len(samples)) / RATE)
+        hearing = sound.hear(samples, RATE)
+        self.check(hearing)
+        self.assertIn("mains hum", " ".join(hearing.notes))
+
+    def test_second_strike_is_told_and_one_free_decay_used(self):
+        samples, late = strike(), round(0.06 * RATE)
+        samples[late:] += 0.8 * samples[:-late].copy()
+        hearing = sound.hear(samples, RATE)
+        self.check(hearing)
+        self.assertIn("2 strikes", " ".join(hearing.notes))
+
+    def test_clipped_start_is_skipped_and_said(self):
+        hearing = sound.hear(numpy.clip(strike(), -1.6, 1.6), RATE)
+        self.check(hearing)
+        self.assertIn("clipped", " ".join(hearing.notes))
+
+    def test_room_is_said_and_decays_are_doubted(self):
+        near = 0
+        for seed in range(4):
+            hearing = sound.hear(add_room(strike(), 0.4, -20, seed), RATE)
+            self.check(hearing, decay_share=0.2)
+            self.assertTrue(0.2 < hearing.room_t60_s < 2.0)
+            self.assertTrue(all(peak.sd_per_s > 0.19 * peak.decay_per_s for peak in hearing.peaks))
+            near += sum(abs(peak.decay_per_s / decay - 1) < 0.15 for peak, (_, decay, _) in zip(hearing.peaks, MODES))
+        self.assertGreaterEqual(near, 19)  # of 20
+        self.assertIsNone(sound.hear(strike(), RATE).room_t60_s)
+
+
+class Assignment(unittest.TestCase):
+    def test_lost_and_false_peaks_are_found(self):
+        model = numpy.log([500.0, 900.0, 1400.0, 2100.0, 2150.0, 3000.0, 4000.0])
+        heard = [0, 2, 3, 4, 6]
+        peaks = numpy.sort(numpy.concatenate([model[heard] + 1e-3, numpy.log([610.0, 2600.0])]))
+        _, trace = constants.align(model[None], peaks, numpy.full((7, 7), 3e-3))
+        self.assertEqual(trace(0), [(0, 0), (2, 2), (3, 3), (4, 4), (6, 6)])
+
+
+class Laws(unittest.TestCase):
+    HZ = numpy.array([210.0, 480.0, 900.0, 1700.0, 2900.0, 4400.0, 6300.0, 9000.0])
+
+    def fit(self, decay, share=0.01, seed=0):
+        rng = numpy.random.default_rng(seed)
+        noisy = decay * (1 + share * rng.normal(size=len(decay)))
+        return losses.fit_laws([sound.Peak(f, 0.01, d, share * d) for f, d in zip(self.HZ, noisy)])[0]
+
+    def test_each_law_is_recognised(self):
+        omega = 2 * math.pi * self.HZ
+        self.assertEqual(self.fit(0.5 * 0.002 * omega).name, "internal friction")
+        self.assertEqual(self.fit(0.5 * (20 + 1e-7 * omega**2)).name, "Rayleigh")
+        law = self.fit(0.5 * (30 + 0.002 * omega))
+        self.assertEqual(law.name, "two powers")
+        for value, sd, true in zip(law.values, law.deviations, (30, 0.002)):
+            self.assertLess(abs(value - true), 2.5 * sd)
+
+    def test_decays_of_no_law_give_a_table(self):
+        law = self.fit(0.5 * 0.002 * 2 * math.pi * self.HZ * numpy.array([1, 4, 0.5, 3, 1, 5, 0.6, 2]))
+        self.assertEqual(law.name, "table")
+        self.assertEqual(len(law.damping["loss_table"]), len(self.HZ))
+
+    def test_no_decays_no_law(self):
+        self.assertEqual(losses.fit_laws([sound.Peak(440.0, 0.1)]), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
