@@ -71,6 +71,7 @@ class Search {
   Decision decide_on_file();
   Setting make_setting(job::Element element, double ratio) const;
   const Trial* find_before(const Trial& trial) const;
+  std::vector<error_bars::Level> list_coarser(const Trial& trial) const;
   double measure_exponent(double Trial::*quantity, double fallback, double min, double max) const;
   double find_dimension() const;
   double predict_worst(bool keeps_geometry, double ratio) const;
@@ -101,6 +102,14 @@ const Trial* Search::find_before(const Trial& trial) const {
   return nullptr;
 }
 
+/// Levels of the earlier trials with the same element, coarser meshes and modes.
+std::vector<error_bars::Level> Search::list_coarser(const Trial& trial) const {
+  std::vector<error_bars::Level> levels;
+  for (const Trial& before : report_.trials)
+    if (before.setting.element == trial.setting.element && before.nodes < trial.nodes && before.modes > 0) levels.push_back(before.level);
+  return levels;
+}
+
 /// Modes of the bank.
 std::vector<std::size_t> Search::find_listed(const error_bars::Corrections& corrections) const {
   return error_bars::find_lowest(corrections, static_cast<std::size_t>(run_.job.max_modes.value_or(std::numeric_limits<int>::max())));
@@ -117,7 +126,9 @@ double Search::find_worst(const error_bars::Corrections& corrections) const {
 double Search::predict_worst(bool keeps_geometry, double ratio) const {
   const error_bars::Level& level = current_.solved.errors.bars.level;
   if (level.parts.empty()) return 0.0;
-  return find_worst(error_bars::calc_corrections(error_bars::predict_level(level, order_, keeps_geometry, ratio), &level));
+  std::vector<error_bars::Level> coarser = list_coarser(report_.trials.back());
+  coarser.push_back(level);
+  return find_worst(error_bars::calc_corrections(error_bars::predict_level(level, order_, keeps_geometry, ratio), coarser));
 }
 
 /// Largest edge ratio predicted to meet the goal; `min` if none above it does.
@@ -131,14 +142,14 @@ double Search::find_ratio(double goal_cents, double min) const {
   return low;
 }
 
-/// Compares the last trial with the previous one: corrections on which both agree, and the convergence order.
+/// Compares the last trial with the previous ones: corrections on which two agree, and the convergence order.
 void Search::compare_levels() {
   error_bars::ErrorBars& bars = current_.solved.errors.bars;
   const Trial& last = report_.trials.back();
   const Trial* before = find_before(last);
   const error_bars::Level* coarser = before == nullptr || before->modes == 0 ? nullptr : &before->level;
   order_ = error_bars::find_order(bars.level, coarser, before == nullptr ? 1.0 : before->edge_m / last.edge_m);
-  if (coarser != nullptr && !bars.level.parts.empty()) bars.corrected = error_bars::calc_corrections(bars.level, coarser);
+  if (coarser != nullptr && !bars.level.parts.empty()) bars.corrected = error_bars::calc_corrections(bars.level, list_coarser(last));
 }
 
 double Search::measure_exponent(double Trial::*quantity, double fallback, double min, double max) const {

@@ -82,14 +82,14 @@ TEST(spectra, wrong_estimate) {
   const std::string id = "wrong_estimate";
   const std::vector<double> known = read_known(17);
   const Estimated coarse = solve_cube(2, 24), fine = solve_cube(4, 24);
-  const error_bars::Corrections right = error_bars::calc_corrections(fine.bars.level, &coarse.bars.level);
+  const error_bars::Corrections right = error_bars::calc_corrections(fine.bars.level, std::span(&coarse.bars.level, 1));
   hold(id, static_cast<double>(std::count(right.correction.begin(), right.correction.end(), Correction::kDisputed)), 0,
        "disputed though right");
   hold(id, find_worst(right, known), 1, "error over bar, two meshes");
   error_bars::Level spoilt = fine.bars.level, spoilt_coarse = coarse.bars.level;
   for (error_bars::Level* level : {&spoilt, &spoilt_coarse})
     for (error_bars::ErrorParts& parts : level->parts) parts.interpolation /= 50;
-  const error_bars::Corrections wrong = error_bars::calc_corrections(spoilt, &spoilt_coarse);
+  const error_bars::Corrections wrong = error_bars::calc_corrections(spoilt, std::span(&spoilt_coarse, 1));
   EXPECT_GT(find_worst(error_bars::calc_corrections(spoilt), known), 1.0) << "one mesh cannot know";
   int trusted = 0;
   for (std::size_t k = 0; k < known.size(); ++k) trusted += wrong.correction[k] == Correction::kDisputed ? 0 : 1;

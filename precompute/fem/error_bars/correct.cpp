@@ -5,7 +5,8 @@
 //   basis: they get the mean of their parts, which is independent of the basis. Bars: half of the mesh's bar around the corrected value,
 //   0.4 of it for T4. If the estimate is a large share of lambda, the mesh's own interval is kept, which lies below the mesh's frequency
 //   except for the uncertainty of lumping and geometry (of T4, its part within 0.45 of the bar). Two meshes agree if |lambda' -
-//   lambda'_coarser| is less than half of the difference of their corrections. For the undetectable part in curved elements that are wide
+//   lambda'_coarser| is less than half of the difference of their corrections, and the coarser's correction is 1.5 times as large; a mesh
+//   that agrees with one coarser mesh is not disputed by another. For the undetectable part in curved elements that are wide
 //   compared with their wall, see parts.hpp, calc_excess().
 // Source: Naga, Zhang and Zhou 2006, SIAM J. Sci. Comput. 28, 1289 (eigenvalues less the energy of the recovered error); Zienkiewicz and
 //   Zhu 1992.
@@ -25,9 +26,11 @@ using bank::Correction;
 
 // Shares of lambda. Above the first limit the estimate is rough, above the second unreliable.
 constexpr double kRoughT4 = 0.5, kStiffT4 = 1.0, kRoughT10 = 0.3, kStiffT10 = 0.6;
-constexpr double kRoughWidthT4 = 0.45, kRoughWidthLumped = 0.5;                  // of the mesh's bar
-constexpr double kSingularShare = 0.25;                                          // of the estimate's energy
-constexpr double kHalf = 0.5, kHalfT4 = 0.4, kQuarter = 0.25, kThird = 1.0 / 3;  // of the mesh's bar
+constexpr double kRoughWidthT4 = 0.45, kRoughWidthLumped = 0.5;               // of the mesh's bar
+constexpr double kSingularShare = 0.25;                                       // of the estimate's energy
+constexpr double kHalf = 0.5, kHalfT4 = 0.4;                                  // of the mesh's bar
+constexpr double kAgreedT4 = 0.25, kAgreed = 0.125, kAgreedCurved = 1.0 / 6;  // of the mesh's bar, two meshes
+constexpr double kApart = 1.5;                                                // of the corrections of two meshes
 constexpr double kOverlaid = 12.0;        // rough: a T4 mode whose bar others make so many times its own; results are the same from 2 to 12
 constexpr double kSameEigenvalue = 1e-6;  // of lambda
 
@@ -39,7 +42,9 @@ Correction find_correction(const ErrorParts& parts, const Level& level) {
   const bool is_t4 = kind == Kind::kT4;
   const double excess = calc_excess(parts, kind);
   if (excess > (is_t4 ? kStiffT4 : kStiffT10)) return Correction::kStiff;
-  if (excess > (is_t4 ? kRoughT4 : kRoughT10) || parts.singular > kSingularShare * parts.interpolation) return Correction::kRough;
+  if (excess > (is_t4 ? kRoughT4 : kRoughT10)) return Correction::kRough;
+  // At inward edges T10 are trusted (kInwardShare), at rims of fixed faces they underestimate.
+  if ((is_t4 || level.has_rims) && parts.singular > kSingularShare * parts.interpolation) return Correction::kRough;
   constexpr double kDoubt = 0.25;  // of the mesh's bar: half of the corrected one
   if (level.is_guessed && calc_facet_cents(parts) > kDoubt * calc_cents(parts, kind)) return Correction::kRough;
   return Correction::kOneMesh;
@@ -84,8 +89,9 @@ OwnIntervals find_intervals(const Level& level, const std::vector<ErrorParts>& p
       high = std::min(std::max(above, stated), stated + width);
       low = std::max(std::min(-all, stated), stated - width);
     } else if (bank::is_corrected(corrections.correction[m])) {
-      const double alone = level.kind == Kind::kT4 && !level.is_lumped ? kHalfT4 : kHalf,
-                   both = level.kind == Kind::kT10Curved ? kThird : kQuarter;
+      const double alone = level.kind == Kind::kT4 && !level.is_lumped ? kHalfT4 : kHalf, both = level.kind == Kind::kT4    ? kAgreedT4
+                                                                                                 : level.kind == Kind::kT10 ? kAgreed
+                                                                                                                            : kAgreedCurved;
       const double factor = corrections.correction[m] == Correction::kOneMesh ? alone : both;
       low = stated - factor * all;
       high = stated + factor * all;
@@ -134,34 +140,53 @@ Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, co
   return corrections;
 }
 
-/// Verdict on the modes of a mesh compared with a coarser one, k-th against k-th. On contradiction the estimate and its bar are wrong: the
+/// Verdict on the modes of a mesh compared with coarser ones, k-th against k-th. On contradiction the estimate and its bar are wrong: the
 /// finer mesh is then closer to the truth than to the coarser mesh.
-Verdict compare(const Level& level, const Corrections& corrections, const Level& coarser) {
-  const Corrections other = calc_corrections(coarser);
-  const std::vector<std::size_t> order = base::find_sort_order(corrections.lambda), before = base::find_sort_order(other.lambda);
+Verdict compare(const Level& level, const Corrections& corrections, std::span<const Level> coarser) {
+  const std::vector<std::size_t> order = base::find_sort_order(corrections.lambda);
   Verdict verdict{corrections.correction, std::vector<double>(corrections.correction.size(), 0.0)};
-  for (std::size_t k = 0; k < std::min(order.size(), before.size()); ++k) {
-    const std::size_t m = order[k], n = before[k];
-    if (corrections.correction[m] != Correction::kOneMesh || other.correction[n] != Correction::kOneMesh) continue;
-    const double fine = corrections.lambda[m], coarse = other.lambda[n];
-    const double by = std::abs((coarser.lambda[n] - coarse) - (level.lambda[m] - fine));
-    if (std::abs(coarse - fine) <= 0.5 * by) verdict.correction[m] = Correction::kTwoMeshes;
-    if (std::abs(to_cents(coarse / fine)) > corrections.cents[m] + other.cents[n]) {
-      verdict.correction[m] = Correction::kDisputed;
-      verdict.least_cents[m] = std::abs(to_cents(coarser.lambda[n] / level.lambda[m]));
+  for (const Level& before : coarser) {
+    const Corrections other = calc_corrections(before);
+    const std::vector<std::size_t> other_order = base::find_sort_order(other.lambda);
+    for (std::size_t k = 0; k < std::min(order.size(), other_order.size()); ++k) {
+      const std::size_t m = order[k], n = other_order[k];
+      if (corrections.correction[m] != Correction::kOneMesh || other.correction[n] != Correction::kOneMesh) continue;
+      const double fine = corrections.lambda[m], coarse = other.lambda[n];
+      const double fine_by = level.lambda[m] - fine, coarse_by = before.lambda[n] - coarse;
+      if (std::abs(coarse - fine) <= 0.5 * std::abs(coarse_by - fine_by) && std::abs(coarse_by) >= kApart * std::abs(fine_by)) {
+        verdict.correction[m] = Correction::kTwoMeshes;
+      } else if (verdict.correction[m] != Correction::kTwoMeshes &&
+                 std::abs(to_cents(coarse / fine)) > corrections.cents[m] + other.cents[n]) {
+        verdict.correction[m] = Correction::kDisputed;
+        verdict.least_cents[m] = std::abs(to_cents(before.lambda[n] / level.lambda[m]));
+      }
     }
   }
   return verdict;
 }
 
+/// Shortens bars to what those of a coarser mesh leave, k-th against k-th.
+void keep_within(const Corrections& coarser, Corrections& corrections) {
+  const std::vector<std::size_t> order = base::find_sort_order(corrections.lambda), before = base::find_sort_order(coarser.lambda);
+  for (std::size_t k = 0; k < std::min(order.size(), before.size()); ++k) {
+    const std::size_t m = order[k], n = before[k];
+    if (corrections.correction[m] == Correction::kDisputed) continue;
+    corrections.cents[m] = std::min(corrections.cents[m], coarser.cents[n] + std::abs(to_cents(coarser.lambda[n] / corrections.lambda[m])));
+  }
+}
+
 }  // namespace
 
-Corrections calc_corrections(const Level& level, const Level* coarser) {
+Corrections calc_corrections(const Level& level, std::span<const Level> coarser) {
   const std::vector<ErrorParts> parts = share_parts(level);
   Verdict verdict{{}, std::vector<double>(parts.size(), 0.0)};
   for (const ErrorParts& mode : parts) verdict.correction.push_back(find_correction(mode, level));
   const Corrections alone = correct(level, parts, verdict);
-  return coarser == nullptr ? alone : correct(level, parts, compare(level, alone, *coarser));
+  if (coarser.empty()) return alone;
+  Corrections corrections = correct(level, parts, compare(level, alone, coarser));
+  if (corrections.facet_cents.empty() && !is_too_short(level))  // facet_cents are on top of the level's own bars
+    keep_within(calc_corrections(coarser.back(), coarser.first(coarser.size() - 1)), corrections);
+  return corrections;
 }
 
 std::vector<double> find_facet_cents(const Level& level, const OwnIntervals& own, const std::vector<double>& cents) {
@@ -181,12 +206,13 @@ std::vector<double> find_facet_cents(const Level& level, const OwnIntervals& own
 }
 
 double find_order(const Level& level, const Level* coarser, double edge_ratio) {
-  constexpr double kThin = 0.5, kMinRatio = 1.2, kMin = 1.5;
+  constexpr double kThin = 0.5, kMinRatio = 1.2, kMin = 1.0;  // of a crack: 2 alpha, its stress growing with r^(alpha - 1)
   const double known = find_order(level.kind);
   if (coarser != nullptr && edge_ratio > kMinRatio) {
     std::vector<double> orders;
     for (std::size_t m = 0; m < std::min(level.parts.size(), coarser->parts.size()); ++m) {
-      const double fine = level.parts[m].interpolation, coarse = coarser->parts[m].interpolation;
+      const double fine = level.parts[m].interpolation - level.parts[m].singular,
+                   coarse = coarser->parts[m].interpolation - coarser->parts[m].singular;
       if (fine > 0 && coarse > 0) orders.push_back(std::log(coarse / fine) / std::log(edge_ratio));
     }
     if (!orders.empty()) {

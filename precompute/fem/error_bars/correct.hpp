@@ -18,6 +18,7 @@ struct Level {
   Kind kind = Kind::kT4;
   bool is_lumped = false;   // the mass
   bool is_guessed = false;  // ErrorParts::doubt comes from the mesh alone: Surface::doubts
+  bool has_rims = false;    // between fixed and free faces
   double one_layer = 0.0;   // fraction of elements that are flat and have all corners on the surface: 1 for a single-layer wall
   Unlisted unlisted;
 };
@@ -38,13 +39,14 @@ struct Corrections {
                                // is_too_short()
   std::vector<double> facet_cents;  // (m) as ErrorBars::facet_cents, around `lambda`; empty: no facets in doubt
   double complete_below = 0.0;      // [rad^2/s^2] modes of the body that are not listed lie above
-  // (m) one mesh: half the mesh's bar (T4: 0.4 of it); two meshes: a quarter (a third for curved elements); rough estimates: the mesh's own
-  // interval; uncorrected modes: the mesh's bar; disputed modes: the distance of the two meshes
+  // (m) one mesh: half the mesh's bar (T4: 0.4 of it); two meshes: an eighth (curved elements a sixth, T4 a quarter); rough estimates: the
+  // mesh's own interval; uncorrected modes: the mesh's bar; disputed modes: the distance of the two meshes
   std::vector<bank::Correction> correction;
 };
 
-/// Corrections of `level`. coarser: another mesh of the same body and element with longer edges, matched mode by mode; null: none. Pure.
-Corrections calc_corrections(const Level& level, const Level* coarser = nullptr);
+/// Corrections of `level`. coarser: other meshes of the same body and element with longer edges, the longest first, matched mode by mode.
+/// Unless disputed, no bar reaches beyond that of the last of them. Pure.
+Corrections calc_corrections(const Level& level, std::span<const Level> coarser = {});
 
 /// (m) Additional width [cents] of each bar of `cents`, from `own`, to cover the body with the alternative surface (ErrorParts::doubt).
 /// Empty without ambiguous facets. Pure.

@@ -177,6 +177,7 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const mesh::LocalMesh&
   level.lambda.assign(solution.lambda.begin(), solution.lambda.end());
   level.one_layer = recovery.one_layer;
   level.is_guessed = recovery.is_guessed;
+  level.has_rims = recovery.has_rims;
   level.unlisted = {solution.high_hz, solution.low_hz, solution.below};
   OwnIntervals own;
   for (std::size_t m = 0; m < solution.lambda.size(); ++m) {

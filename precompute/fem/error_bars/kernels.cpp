@@ -200,7 +200,7 @@ void add_energies_t10(const Elements& elements, const std::int32_t* value_of, co
         for (int m = 0; m < 6; ++m) d[4 + m] = values[value[4 + m]][r] - (corner[mesh::kEdges[m][0]] + corner[mesh::kEdges[m][1]]) * 0.5F;
         squares += integrate_square(d);
       }
-      squares *= elements.volume[e];
+      squares *= elements.volume[e] * elements.share[e];
       errors += squares;
       singulars += squares * elements.singular[e];
       bents += squares * elements.bent[e];

@@ -39,7 +39,8 @@ struct Elements {
   std::vector<float> gradient;              // (e, s, n - 1, 3) of the shape functions 1 ... n - 1 [1/m]
   std::vector<float> weight;                // (e, 4, s, t) contribution of a sample to the terms of the patches
   std::vector<float> volume;                // (e) [m^3]
-  std::vector<float> singular;              // (e) 1: touches an edge with singular stress (Surface::is_singular), 0: does not
+  std::vector<float> singular;              // (e) 1: touches an edge with singular stress (Surface::singular), 0: does not
+  std::vector<float> share;                 // (e) of the energy of recovered minus computed strain that is error; T10
   std::vector<float> bent;                  // (e) curvature rise over the element (Surface::bend), squared
   std::vector<std::array<float, 36>> root;  // (materials) U with U^T U = C, row-major, upper triangular
   std::vector<float> dilatation;            // (materials) factor of a T10's dilatation beyond its mean; 1, less when nearly incompressible

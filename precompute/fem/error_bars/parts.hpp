@@ -28,8 +28,8 @@ struct ErrorParts {
 /// Power of the edge length in interpolation errors of smooth modes: 2 for T4, 4 for T10.
 double find_order(Kind kind);
 
-/// Predicts the parts on a mesh with edges `edge_ratio` times as long. order: of interpolation, find_order() or measured. For smooth modes;
-/// a fixed face with its singular rim converges slower, covered by the safety factor for ratios down to about 1/4. Pure.
+/// Predicts the parts on a mesh with edges `edge_ratio` times as long. order: of interpolation away from singular edges, find_order() or
+/// measured. Pure.
 ErrorParts predict_parts(const ErrorParts& parts, Kind kind, double order, double edge_ratio);
 
 /// Excess of lambda due to the elements; for T10 including the undetectable part of strongly curved elements in a thin wall. Pure.

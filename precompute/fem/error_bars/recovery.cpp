@@ -36,6 +36,9 @@ namespace {
 constexpr double kRidgeT4 = 1e-3, kRidgeT10 = 1e-2;  // from 1e-4 ... 1: smallest scatter on the training bodies of docs/error-bars.md
 // Depth of the layer relative to the size of an element at the surface: smallest scatter on strips and training bodies.
 constexpr double kLayer = 0.125;
+// Of the estimate of T10 at inward edges. With all elements around an edge of 270 degrees halved again and again, lambda falls by 0.66 of
+// what the estimates fall by (0.55 in walls of one layer), three quarters of it in the elements that touch the edge.
+constexpr float kInwardShare = 0.5F;
 constexpr double kFlatness = 1e-10;  // tolerance for flat elements in the terms without ridge
 
 /// 1, x, y, z, xx, yy, zz, xy, yz, xz relative to the patch's vertex, in units of `scale`.
@@ -216,6 +219,7 @@ void fill_elements(const mesh::LocalMesh& local, std::span<const Solid> solids, 
   elements.gradient.resize(elements.count * s * (n - 1) * 3);
   elements.volume.resize(elements.count);
   elements.singular.resize(elements.count);
+  elements.share.resize(elements.count);
   elements.bent.resize(elements.count);
   elements.patch.resize(elements.count * 4);
   recovery.value_of.resize(elements.count * n);
@@ -234,7 +238,10 @@ void fill_elements(const mesh::LocalMesh& local, std::span<const Solid> solids, 
     if (!(volume > 0))
       throw InputError(fmt::format("element {} of the mesh has no volume; remesh there", local.tet_in_mesh[recovery.order[e]] + 1));
     elements.volume[e] = static_cast<float>(volume);
-    elements.singular[e] = std::any_of(tet, tet + 4, [&](std::int32_t node) { return surface.is_singular[node] != 0; }) ? 1.0F : 0.0F;
+    const int edges =
+        std::accumulate(tet, tet + 4, 0, [&](int bits, std::int32_t node) { return bits | static_cast<int>(surface.singular[node]); });
+    elements.singular[e] = edges != 0 ? 1.0F : 0.0F;
+    elements.share[e] = edges == kInward ? kInwardShare : 1.0F;
     const float bend = std::accumulate(tet, tet + 4, 0.0F, [&](float sum, std::int32_t node) { return sum + surface.bend[node] / 4; });
     elements.bent[e] = bend * bend;
     for (int v = 0; v < 4; ++v) elements.patch[4 * e + v] = recovery.vertex_place[tet[v]] * elements.materials + elements.material[e];
@@ -416,6 +423,7 @@ Recovery make_recovery(const comm::Communicator& comm, const mesh::LocalMesh& lo
   comm.sum(size);
   recovery.one_layer = size[2] / size[1];
   recovery.is_guessed = !comm.all(surface.doubts.empty());
+  recovery.has_rims = !comm.all(std::none_of(surface.singular.begin(), surface.singular.end(), [](char s) { return (s & kRim) != 0; }));
 
   std::unique_ptr<Patches> patches;
   comm.agree([&] {

@@ -26,6 +26,7 @@ struct Recovery {
   comm::HaloExchange nodes, vertices;      // of values at places; at places among the vertices
   double one_layer = 0.0;                  // Level::one_layer
   bool is_guessed = false;                 // Level::is_guessed
+  bool has_rims = false;                   // Level::has_rims
 };
 
 /// Collective. Throws InputError naming an element without volume or a material that is not positive definite, on all ranks alike.

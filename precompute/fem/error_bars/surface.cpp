@@ -202,12 +202,12 @@ double calc_gap(const mesh::LocalMesh& local, std::int32_t tet, int a, int b, co
 struct Mark {
   std::int32_t node = 0;  // in the whole mesh
   float bend = 0.0F;
-  char is_outer = 0, is_singular = 0;
+  char is_outer = 0, singular = 0;
 
   void join(const Mark& other) {
     bend = std::max(bend, other.bend);
     is_outer |= other.is_outer;
-    is_singular |= other.is_singular;
+    singular |= other.singular;
   }
 };
 
@@ -216,7 +216,7 @@ std::vector<Mark> find_marks(const comm::Communicator& comm, const mesh::LocalMe
                              const std::vector<float>& bend) {
   struct Side {
     std::array<std::int32_t, 2> key;  // node numbers in the whole mesh, ascending
-    Vec3 normal, across;              // unit: of the face; from the middle of the edge to the opposite corner
+    Vec3 normal, across;              // unit, at the middle of the edge: of the face; in the face, from the edge to the opposite corner
     char is_fixed;
   };
   std::vector<std::array<std::int32_t, 2>> ends;  // local nodes of the sides
@@ -227,18 +227,22 @@ std::vector<Mark> find_marks(const comm::Communicator& comm, const mesh::LocalMe
       std::array<std::int32_t, 3> nodes;
       for (int i = 0; i < 3; ++i) nodes[i] = get_node(local, face.tet, loop[i]);
       const std::array<Vec3, 3> x{local.nodes_m[nodes[0]], local.nodes_m[nodes[1]], local.nodes_m[nodes[2]]};
-      const Vec3 normal = normalise(cross(x[1] - x[0], x[2] - x[0]));
       const bool is_fixed = local.row[nodes[0]] < 0 && local.row[nodes[1]] < 0 && local.row[nodes[2]] < 0;
       for (int i = 0; i < 3; ++i) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
         const auto [low, high] = std::minmax(local.node_in_mesh[nodes[i]], local.node_in_mesh[nodes[j]]);
-        list.push_back({{low, high}, normal, normalise(x[k] - 0.5 * (x[i] + x[j])), static_cast<char>(is_fixed)});
+        Vec3 across = x[k] - 0.5 * (x[i] + x[j]);
+        if (local.order == 2) {  // derivative of the quadratic map
+          const auto middle = [&](int a, int b) { return local.nodes_m[get_node(local, face.tet, 4 + mesh::find_edge(loop[a], loop[b]))]; };
+          across = 2 * (middle(j, k) + middle(k, i) - middle(i, j)) - 0.5 * (x[i] + x[j]) - x[k];
+        }
+        list.push_back({{low, high}, normalise(cross(x[j] - x[i], across)), normalise(across), static_cast<char>(is_fixed)});
         ends.push_back({nodes[i], nodes[j]});
       }
     }
     return list;
   });
-  const auto is_singular = comm::query_owners<char>(
+  const auto singular = comm::query_owners<char>(
       comm, sides, [&](const Side& side) { return side.key[0] % comm.size(); },
       [](const comm::ByRank<Side>& met) {
         std::map<std::array<std::int32_t, 2>, std::vector<std::size_t>> at;
@@ -248,7 +252,8 @@ std::vector<Mark> find_marks(const comm::Communicator& comm, const mesh::LocalMe
           for (const std::size_t i : all)
             for (const std::size_t j : all) {
               const Side &a = met.items[i], &b = met.items[j];
-              if (i != j && (a.is_fixed != b.is_fixed || dot(a.normal, b.across) > kInwardSine)) answers[i] = answers[j] = 1;
+              const int kind = (a.is_fixed != b.is_fixed ? kRim : 0) | (dot(a.normal, b.across) > kInwardSine ? kInward : 0);
+              if (i != j) answers[i] |= static_cast<char>(kind), answers[j] |= static_cast<char>(kind);
             }
         return answers;
       });
@@ -257,7 +262,7 @@ std::vector<Mark> find_marks(const comm::Communicator& comm, const mesh::LocalMe
     std::vector<Mark> list(local.nodes_m.size());
     for (std::size_t n = 0; n < list.size(); ++n) list[n].node = local.node_in_mesh[n];
     for (std::size_t s = 0; s < ends.size(); ++s)  // three per face
-      for (const std::int32_t node : ends[s]) list[node].join({0, bend[s / 3], 1, is_singular[s]});
+      for (const std::int32_t node : ends[s]) list[node].join({0, bend[s / 3], 1, singular[s]});
     return list;
   });
   return comm::query_owners<Mark>(
@@ -306,7 +311,7 @@ Surface find_surface(const comm::Communicator& comm, const mesh::LocalMesh& loca
     if (!is_fixed) surface.free_faces.push_back(free);
   }
   for (const Mark& mark : find_marks(comm, local, faces, bend)) {
-    surface.is_singular.push_back(mark.is_singular);
+    surface.singular.push_back(mark.singular);
     surface.is_outer.push_back(mark.is_outer);
     surface.bend.push_back(mark.bend);
   }

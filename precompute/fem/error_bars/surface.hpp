@@ -28,13 +28,18 @@ struct FreeFace {
   double height_m = 0.0;  // of the element over it
 };
 
+/// Edges with singular stress.
+enum Singular : char {
+  kRim = 1,     // between fixed and free faces
+  kInward = 2,  // inward, sharper than 50 degrees
+};
+
 struct Surface {
   std::vector<SurfaceEdge> edges;
   std::vector<SurfaceEdge> doubts;  // gap to the round surface that faces turning by 50 to 80 degrees may stand for
   std::vector<FreeFace> free_faces;
-  /// (nodes) 1 at stress singularities, where errors converge slowly: vertices of inward edges sharper than 50 degrees and of edges between
-  /// fixed and free faces. Complete on every rank.
-  std::vector<char> is_singular;
+  /// (nodes) bits of Singular at stress singularities, where errors converge slowly. Complete on every rank.
+  std::vector<char> singular;
   std::vector<char> is_outer;  // (nodes) 1 at corners of surface faces, complete on every rank
   /// (nodes) largest rise of the smooth surface above the chords of the adjacent edges, relative to the height of the elements; 0 inside
   /// and on flat parts. Complete on every rank.

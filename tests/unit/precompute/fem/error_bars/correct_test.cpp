@@ -82,6 +82,15 @@ TEST(Bars, grow_with_how_far_elements_bend_of_T10_only) {
   EXPECT_NEAR(error_bars::predict_parts(bent, Kind::kT10Curved, 4, 0.5).bent, 0.01 / 64, 1e-15);
 }
 
+TEST(Parts, at_singular_edges_fall_with_their_own_order) {
+  ErrorParts parts;
+  parts.interpolation = 0.05;
+  parts.singular = 0.02;
+  const ErrorParts then = error_bars::predict_parts(parts, Kind::kT10, 4, 0.125);
+  EXPECT_NEAR(then.singular, 0.02 / 16, 1e-15);
+  EXPECT_NEAR(then.interpolation, 0.03 / 4096 + 0.02 / 16, 1e-15);
+}
+
 /// A synthetic level of modes.
 Level make_level(const std::vector<double>& hz, const std::vector<double>& interpolation, Kind kind = Kind::kT10) {
   Level level;
@@ -106,9 +115,13 @@ TEST(Correction, is_refused_to_what_the_elements_cannot_follow) {
   Level lumped = make_level({100}, {0.01});
   lumped.is_lumped = true;
   EXPECT_EQ(find(lumped), (std::vector{Correction::kLumped}));
-  Level kink = make_level({100, 200}, {0.01, 0.01});
-  kink.parts[1].singular = 0.005;
-  EXPECT_EQ(find(kink), (std::vector{Correction::kOneMesh, Correction::kRough}));
+  for (const Kind kind : {Kind::kT10, Kind::kT4}) {
+    Level kink = make_level({100, 200}, {0.01, 0.01}, kind);
+    kink.parts[1].singular = 0.005;
+    EXPECT_EQ(find(kink)[1], kind == Kind::kT4 ? Correction::kRough : Correction::kOneMesh) << "an inward edge";
+    kink.has_rims = true;
+    EXPECT_EQ(find(kink), (std::vector{Correction::kOneMesh, Correction::kRough}));
+  }
   const error_bars::Corrections refused = error_bars::calc_corrections(make_level({300}, {0.7}));
   EXPECT_EQ(refused.lambda[0], make_level({300}, {0.7}).lambda[0]) << "the mesh's own value is kept";
 }
@@ -162,24 +175,53 @@ TEST(Facets, in_doubt_are_no_part_of_any_bar_and_are_stated_next_to_it) {
   EXPECT_LT(both.facet_cents[2], 1e-9) << "the third is far from the others";
 }
 
-TEST(TwoMeshes, that_agree_shorten_the_bar_to_a_quarter) {
+TEST(TwoMeshes, that_agree_shorten_the_bar_to_an_eighth) {
   // The truth is 1000 Hz; the error is the estimate, sixteen times as large on the coarser mesh.
   const auto sharp = [](double i) { return 1000 * std::sqrt(1 + i); };
   const Level fine = make_level({sharp(0.01)}, {0.01}), coarse = make_level({sharp(0.16)}, {0.16});
-  const error_bars::Corrections alone = error_bars::calc_corrections(fine), both = error_bars::calc_corrections(fine, &coarse);
+  const error_bars::Corrections alone = error_bars::calc_corrections(fine),
+                                both = error_bars::calc_corrections(fine, std::span(&coarse, 1));
   EXPECT_EQ(both.correction[0], Correction::kTwoMeshes);
   EXPECT_NEAR(both.lambda[0] / alone.lambda[0], 1, 1e-12);
-  EXPECT_NEAR(both.cents[0] / alone.cents[0], 0.5, 1e-9);
+  EXPECT_NEAR(both.cents[0] / alone.cents[0], 0.25, 1e-9);
   EXPECT_NEAR(alone.cents[0] / error_bars::calc_cents(fine.parts[0], fine.kind), 0.5, 1e-9);
 }
 
 TEST(TwoMeshes, that_contradict_each_other_leave_the_meshs_value_and_a_bar_that_spans_both) {
   // A wrong estimate: it predicts almost no error, and the finer mesh is 60 cents lower.
   const Level fine = make_level({1000}, {1e-4}), coarse = make_level({1035}, {4e-4});
-  const error_bars::Corrections both = error_bars::calc_corrections(fine, &coarse);
+  const error_bars::Corrections both = error_bars::calc_corrections(fine, std::span(&coarse, 1));
   EXPECT_EQ(both.correction[0], Correction::kDisputed);
   EXPECT_EQ(both.lambda[0], fine.lambda[0]);
   EXPECT_NEAR(both.cents[0], 1200 * std::log2(1.035), 1e-9) << "as far as they are apart";
+}
+
+TEST(TwoMeshes, that_agree_are_not_disputed_by_a_third) {
+  const auto sharp = [](double i) { return 1000 * std::sqrt(1 + i); };
+  const std::vector<Level> coarser{make_level({1150}, {1e-3}), make_level({sharp(0.16)}, {0.16})};
+  const Level fine = make_level({sharp(0.01)}, {0.01});
+  EXPECT_EQ(error_bars::calc_corrections(fine, std::span(coarser).first(1)).correction[0], Correction::kDisputed);
+  EXPECT_EQ(error_bars::calc_corrections(fine, coarser).correction[0], Correction::kTwoMeshes);
+}
+
+TEST(TwoMeshes, of_nearly_the_same_size_have_no_longer_bar_than_the_coarser) {
+  const auto make = [](double i) { return make_level({1000 * std::sqrt(1 + i)}, {i}); };
+  const std::vector<Level> levels{make(0.03), make(0.018), make(0.0145)};
+  const auto find = [&](std::size_t meshes) { return error_bars::calc_corrections(levels[meshes], std::span(levels).first(meshes)); };
+  EXPECT_EQ(find(1).correction[0], Correction::kTwoMeshes);
+  const error_bars::Corrections near = error_bars::calc_corrections(levels[2], std::span(levels).subspan(1, 1));
+  EXPECT_EQ(near.correction[0], Correction::kOneMesh) << "too near for a verdict";
+  EXPECT_LE(near.cents[0], error_bars::calc_corrections(levels[1]).cents[0]);
+  EXPECT_LT(find(2).cents[0], find(1).cents[0]) << "all coarser meshes are compared";
+  std::vector<Level> apart{make(0.02), make(0.01), make(0.0099)};
+  apart[0].lambda[0] *= 1.004;  // agrees with the second mesh by a little, with the third no more
+  apart[2].lambda[0] *= 0.9985;
+  const error_bars::Corrections before = error_bars::calc_corrections(apart[1], std::span(apart).first(1)),
+                                after = error_bars::calc_corrections(apart[2], std::span(apart).first(2));
+  ASSERT_EQ(before.correction[0], Correction::kTwoMeshes);
+  ASSERT_EQ(after.correction[0], Correction::kOneMesh);
+  const double shift = std::abs(600 * std::log2(before.lambda[0] / after.lambda[0]));
+  EXPECT_NEAR(after.cents[0], before.cents[0] + shift, 1e-9) << "the coarser's interval";
 }
 
 TEST(Degenerate, modes_are_corrected_alike_whatever_basis_their_shapes_are) {
@@ -219,7 +261,7 @@ TEST(Levels, that_are_predicted_keep_what_is_believed_and_shrink_its_bars) {
   const Level level = make_level({1000, 1500, 1600, 2500}, {0.01, 0.02, 0.2, 0.04});
   const Level then = error_bars::predict_level(level, 4.0, false, 0.5);
   EXPECT_TRUE(std::is_sorted(then.lambda.begin(), then.lambda.end()));
-  auto believed = error_bars::calc_corrections(level).lambda, later = error_bars::calc_corrections(then, &level).lambda;
+  auto believed = error_bars::calc_corrections(level).lambda, later = error_bars::calc_corrections(then, std::span(&level, 1)).lambda;
   std::sort(believed.begin(), believed.end());
   std::sort(later.begin(), later.end());
   for (std::size_t m = 0; m < 4; ++m) EXPECT_NEAR(later[m] / believed[m], 1, 1e-12);
