@@ -27,12 +27,13 @@ namespace {
 
 constexpr std::size_t kMaxTrials = 7;
 constexpr std::int64_t kCoarseShapeNodes = 1500, kCoarseSurfaceNodes = 6000;
-constexpr double kGoal = 0.85;        // safety factor of the target, so that the next trial is the last
-constexpr double kFinestStep = 0.25;  // range of the convergence rates, see predict_level()
-constexpr double kFirstGrowth = 3.0;  // maximum, of the nodes from the first mesh to the second
-constexpr double kMinStep = 0.9;      // maximum: nearly equal edges give no new information
-constexpr int kMaxCounts = 4;         // node counts tried per trial
-constexpr int kMaxRefinements = 4;    // of a mesh file: 4,096 elements per element
+constexpr double kGoal = 0.85;         // safety factor of the target, so that the next trial is the last
+constexpr double kFinestStep = 0.25;   // range of the convergence rates, see predict_level()
+constexpr double kUnsureGrowth = 3.0;  // maximum, of the nodes until two meshes agree on the mode with the widest bar
+constexpr double kApart = 0.9;         // then on the edges, so that the next mesh is far enough from this one for a verdict
+constexpr double kMinStep = 0.9;       // maximum: nearly equal edges give no new information
+constexpr int kMaxCounts = 4;          // node counts tried per trial
+constexpr int kMaxRefinements = 4;     // of a mesh file: 4,096 elements per element
 
 /// Next step of all ranks, decided on rank 0.
 struct Decision {
@@ -239,11 +240,12 @@ std::string Search::describe_surface(double cents) const {
 Decision Search::decide_on_body() {
   const Trial& last = report_.trials.back();
   if (last.modes == 0) return {0, make_setting(last.setting.element, 0.5)};
-  // Errors estimated on one mesh are often twenty times too large; two meshes tell more, and a second of three times the nodes is cheap.
-  const Trial* before = find_before(last);
-  const double finest = before == nullptr || before->modes == 0 ? std::pow(kFirstGrowth, -1.0 / find_dimension()) : kFinestStep;
-  const double ratio = std::min(find_ratio(kGoal * asked_, finest), kMinStep);
-  return {0, make_setting(last.setting.element, ratio)};
+  // Errors estimated on one mesh are often twenty times too large; two meshes that agree tell more, and one of three times the nodes is
+  // cheap.
+  const bool is_agreed = last.correction == bank::Correction::kTwoMeshes;
+  const double finest = is_agreed ? kFinestStep : std::pow(kUnsureGrowth, -1.0 / find_dimension());
+  const double ratio = find_ratio(kGoal * asked_, finest) * (is_agreed ? 1.0 : kApart);
+  return {0, make_setting(last.setting.element, std::clamp(ratio, finest, kMinStep))};
 }
 
 /// Rank 0: next setting of a mesh file: T4, T10, T10 refined.
@@ -322,6 +324,7 @@ void Search::judge_bars(Trial& trial) const {
     if (cents <= trial.worst_cents) continue;
     trial.worst_cents = cents;
     trial.worst_hz = std::sqrt(bars.corrected.lambda[k]) / (2 * std::numbers::pi);
+    trial.correction = bars.corrected.correction[k];
   }
 }
 
@@ -335,9 +338,10 @@ void Search::attempt(const Setting& setting) {
   compare_levels();
   Trial& trial = report_.trials.back();
   judge_bars(trial);
-  run_.log.print(trial.modes == 0 ? std::string("no mode in the band")
-                                  : fmt::format("error bars up to {:.3g} cents (at {:.1f} Hz); {:g} requested", trial.worst_cents,
-                                                trial.worst_hz, asked_));
+  run_.log.print(trial.modes == 0
+                     ? std::string("no mode in the band")
+                     : fmt::format("error bars up to {:.3g} cents (at {:.1f} Hz{}); {:g} requested", trial.worst_cents, trial.worst_hz,
+                                   trial.correction == bank::Correction::kDisputed ? ", two meshes contradict each other" : "", asked_));
 }
 
 Forecast Search::forecast_next() const {

@@ -20,13 +20,14 @@ struct Trial {
   cost::ProblemSize size;
   double edge_m = 0.0;  // mean length of all element edges
   std::size_t modes = 0;
-  double worst_cents = 0.0;      // largest error bar, algebraic plus discretisation
-  double worst_hz = 0.0;         // its mode
-  double algebraic_cents = 0.0;  // largest algebraic part
-  double facet_cents = 0.0;      // largest addition by ambiguous facets; not part of a bar
-  double cpu_seconds = 0.0;      // all ranks
-  std::int64_t peak_bytes = 0;   // all ranks, the process so far
-  error_bars::Level level;       // its modes and error estimates
+  double worst_cents = 0.0;                                  // largest error bar, algebraic plus discretisation
+  double worst_hz = 0.0;                                     // its mode
+  bank::Correction correction = bank::Correction::kOneMesh;  // of this mode
+  double algebraic_cents = 0.0;                              // largest algebraic part
+  double facet_cents = 0.0;                                  // largest addition by ambiguous facets; not part of a bar
+  double cpu_seconds = 0.0;                                  // all ranks
+  std::int64_t peak_bytes = 0;                               // all ranks, the process so far
+  error_bars::Level level;                                   // its modes and error estimates
 };
 
 /// The next stricter setting and its predicted cost.
