@@ -26,11 +26,11 @@ using bank::Correction;
 
 // Shares of lambda. Above the first limit the estimate is rough, above the second unreliable.
 constexpr double kRoughT4 = 0.5, kStiffT4 = 1.0, kRoughT10 = 0.3, kStiffT10 = 0.6;
-constexpr double kRoughWidthT4 = 0.45, kRoughWidthLumped = 0.5;               // of the mesh's bar
-constexpr double kSingularShare = 0.25;                                       // of the estimate's energy
-constexpr double kHalf = 0.5, kHalfT4 = 0.4;                                  // of the mesh's bar
-constexpr double kAgreedT4 = 0.25, kAgreed = 0.125, kAgreedCurved = 1.0 / 6;  // of the mesh's bar, two meshes
-constexpr double kApart = 1.5;                                                // of the corrections of two meshes
+constexpr double kRoughWidthT4 = 0.45, kRoughWidthLumped = 0.5;  // of the mesh's bar
+constexpr double kSingularShare = 0.25;                          // of the estimate's energy
+constexpr double kHalf = 0.5, kHalfT4 = 0.4;                     // of the mesh's bar
+constexpr double kAgreed = 0.25, kAgreedT10 = 0.125;             // of the mesh's bar, two meshes; T10: straight ones
+constexpr double kApart = 1.5;                                   // of the corrections of two meshes
 constexpr double kOverlaid = 12.0;        // rough: a T4 mode whose bar others make so many times its own; results are the same from 2 to 12
 constexpr double kSameEigenvalue = 1e-6;  // of lambda
 
@@ -89,9 +89,8 @@ OwnIntervals find_intervals(const Level& level, const std::vector<ErrorParts>& p
       high = std::min(std::max(above, stated), stated + width);
       low = std::max(std::min(-all, stated), stated - width);
     } else if (bank::is_corrected(corrections.correction[m])) {
-      const double alone = level.kind == Kind::kT4 && !level.is_lumped ? kHalfT4 : kHalf, both = level.kind == Kind::kT4    ? kAgreedT4
-                                                                                                 : level.kind == Kind::kT10 ? kAgreed
-                                                                                                                            : kAgreedCurved;
+      const double alone = level.kind == Kind::kT4 && !level.is_lumped ? kHalfT4 : kHalf,
+                   both = level.kind == Kind::kT10 ? kAgreedT10 : kAgreed;
       const double factor = corrections.correction[m] == Correction::kOneMesh ? alone : both;
       low = stated - factor * all;
       high = stated + factor * all;

@@ -185,6 +185,10 @@ TEST(TwoMeshes, that_agree_shorten_the_bar_to_an_eighth) {
   EXPECT_NEAR(both.lambda[0] / alone.lambda[0], 1, 1e-12);
   EXPECT_NEAR(both.cents[0] / alone.cents[0], 0.25, 1e-9);
   EXPECT_NEAR(alone.cents[0] / error_bars::calc_cents(fine.parts[0], fine.kind), 0.5, 1e-9);
+  Level round = fine, before = coarse;
+  round.kind = before.kind = Kind::kT10Curved;
+  const error_bars::Corrections curved = error_bars::calc_corrections(round, std::span(&before, 1));
+  EXPECT_NEAR(curved.cents[0] / error_bars::calc_cents(round.parts[0], round.kind), 0.25, 1e-9) << "a quarter";
 }
 
 TEST(TwoMeshes, that_contradict_each_other_leave_the_meshs_value_and_a_bar_that_spans_both) {
