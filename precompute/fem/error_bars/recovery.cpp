@@ -37,7 +37,7 @@ constexpr double kRidgeT4 = 1e-3, kRidgeT10 = 1e-2;  // from 1e-4 ... 1: smalles
 // Depth of the layer relative to the size of an element at the surface: smallest scatter on strips and training bodies.
 constexpr double kLayer = 0.125;
 // Of the estimate of T10 at inward edges. With all elements around an edge of 270 degrees halved again and again, lambda falls by 0.66 of
-// what the estimates fall by (0.55 in walls of one layer), three quarters of it in the elements that touch the edge.
+// what the estimates fall by (0.6 in walls of one layer), three quarters of it in the elements that touch the edge.
 constexpr float kInwardShare = 0.5F;
 constexpr double kFlatness = 1e-10;  // tolerance for flat elements in the terms without ridge
 
