@@ -54,6 +54,7 @@ Numbers make_numbers(const Plan& plan);
 struct Workspace {
   std::vector<double*> blocks;  // one per kBlockColumns columns: rows of all slots
   std::vector<Buffer> buffers;  // memory of blocks that do not fit behind the panels
+  Buffer columns;               // of the panels of a shared front: this rank's solutions or sums
 };
 
 /// x <- A^-1 b for at most kSolveColumns columns, `stride` apart; b may be x. Collective.

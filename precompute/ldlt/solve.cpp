@@ -1,7 +1,8 @@
 // Method: L D L^T X = B by fronts: forward in elimination order, backward in reverse, in place on the rows of the right-hand sides. Panels
 // are applied as products (L11^-1 is stored, so there is no triangular solve) and read once in each direction for up to 32 columns. For a
 // shared front each rank multiplies its tiles; the owner of a diagonal tile sums the partial results along its row and sends its part of
-// the solution down its column; backward, along its row. The row of the next panel is multiplied first, so that the next owner can start.
+// the solution down its column; backward, along its row. The row of the next panel is multiplied first, so that the next owner can start;
+// rows behind the pivots, on which no panel of the front waits, after all panels, backward before all.
 // Source: Liu 1992, section 6; Ashcraft, Eisenstat, Liu 1990, A fan-in algorithm for distributed sparse numerical factorization (sums
 // travel to the owner once).
 #include <algorithm>
@@ -34,6 +35,7 @@ class Solver {
       blocks_.push_back({workspace.blocks[first / kBlockColumns], count > 8 ? 16 : 8, count, first});
       row_width_ += blocks_.back().width;
     }
+    columns_ = workspace.columns.data();
   }
 
   void load(const double* b, std::ptrdiff_t stride) {
@@ -239,11 +241,22 @@ class Solver {
     return slots;
   }
 
+  /// Places with the one that the next panel waits for first, or last where the others' messages have come before its own.
+  enum class Critical { kIsFirst, kIsLast };
+  static std::vector<int> order_places(std::vector<int> places, int critical, Critical where) {
+    const auto at = std::find(places.begin(), places.end(), critical);
+    if (at != places.end() && where == Critical::kIsFirst) std::rotate(places.begin(), at, at + 1);
+    if (at != places.end() && where == Critical::kIsLast) std::rotate(at, at + 1, places.end());
+    return places;
+  }
+  /// Place of the tile below diagonal tile k, -1: the last pivot tile.
+  static int find_below(const SharedFront& front, int k) { return k + 1 < front.map.pivot_tiles() ? front.map.owner(k + 1, k) : -1; }
+
   static bool contains(const std::vector<int>& places, int place) { return std::binary_search(places.begin(), places.end(), place); }
 
   /// Subtracts the tiles of column k, own nodes `begin` to `end`, times the solution there.
   void subtract_column(const SharedFront& front, const double* tiles, int k, std::int32_t begin, std::int32_t end,
-                       const std::vector<const double*>& in) {
+                       const std::vector<double*>& in) {
     const int n = 3 * front.map.nodes(k);
     const std::int32_t first = front.row_begin[k + 1];
     if (begin == end) return;
@@ -252,21 +265,30 @@ class Solver {
                                 nodes_.data() + begin, blocks_[b].rows);
   }
 
+  /// Room for a panel's part of each block, and its blocks.
+  std::vector<double*> list_panel(int k) {
+    std::vector<double*> rows;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) rows.push_back(columns_ + (k * blocks_.size() + b) * kMaxBlock * kWidth);
+    return rows;
+  }
+
   void forward_shared(std::size_t f) {
     const SharedFront& front = plan_.shared[f];
     for (const SumMessage& sums : front.from_children) receive_sums(sums, kSums, Arrival::kIsAdded);
     nodes_.resize(front.own_nodes());
     std::iota(nodes_.begin(), nodes_.end(), front.first_slot);
+    const std::int32_t behind = front.row_begin[front.map.pivot_tiles()];
+    std::vector<std::vector<double*>> solutions(front.map.pivot_tiles());  // of the columns of this rank
     alignas(64) double pivots[kMaxBlock * 16];
     for (int k = 0; k < front.map.pivot_tiles(); ++k) {
       const SharedPanel& panel = numbers_.shared[f][k];
       const int home = front.map.owner(k, k);
       const int n = 3 * front.map.nodes(k);
       const std::vector<int>& column = front.column_places[k];
-      std::vector<const double*> in;
+      std::vector<double*>& in = solutions[k];
       if (home == front.place) {
         const Ints slots = list_slots(front, k);
-        for (const std::int32_t place : front.row_places[k])
+        for (const std::int32_t place : order_places(front.row_places[k], k > 0 ? front.map.owner(k, k - 1) : -1, Critical::kIsLast))
           receive(front.map.rank(place), find_tag(front.id, kAlongRow), slots, Arrival::kIsAdded);
         for (const Block& block : blocks_) {
           double* own = find_row(block, slots.front());
@@ -275,9 +297,11 @@ class Solver {
           kernels_.trmm(numbers_.panels.data() + panel.triangle, n, block.width / 8, pivots, own);
           in.push_back(own);
         }
-        for (const std::int32_t place : column) send(front.map.rank(place), find_tag(front.id, kAlongColumn), slots);
+        for (const std::int32_t place : order_places(column, find_below(front, k), Critical::kIsFirst))
+          send(front.map.rank(place), find_tag(front.id, kAlongColumn), slots);
       } else if (contains(column, front.place)) {
-        in = receive_block(front.map.rank(home), find_tag(front.id, kAlongColumn), n);
+        in = list_panel(k);
+        receive_block(front.map.rank(home), find_tag(front.id, kAlongColumn), n, in);
       }
       const std::int32_t begin = front.row_begin[k + 1];
       const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[k + 2] : begin;
@@ -285,8 +309,11 @@ class Solver {
       if (!in.empty()) subtract_column(front, tiles, k, begin, next, in);
       if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[k + 1], front.place))
         send(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1));
-      if (!in.empty()) subtract_column(front, tiles, k, next, front.own_nodes(), in);
+      if (!in.empty()) subtract_column(front, tiles, k, next, behind, in);
     }
+    for (int k = 0; k < front.map.pivot_tiles(); ++k)
+      if (!solutions[k].empty())
+        subtract_column(front, numbers_.find_tiles(numbers_.shared[f][k]), k, behind, front.own_nodes(), solutions[k]);
     for (const SumMessage& sums : front.to_parent) send_sums(sums, kSums);
   }
 
@@ -295,29 +322,40 @@ class Solver {
     for (const SumMessage& sums : front.to_parent) receive_sums(sums, kSolutions, Arrival::kIsSet);
     nodes_.resize(front.own_nodes());
     std::iota(nodes_.begin(), nodes_.end(), front.first_slot);
+    const std::int32_t behind = front.row_begin[front.map.pivot_tiles()];
+    std::vector<std::vector<double*>> sums_of_panel(front.map.pivot_tiles());  // of the columns of this rank
     for (int k = front.map.pivot_tiles(); k-- > 0;) {
       const SharedPanel& panel = numbers_.shared[f][k];
       const bool is_home = front.map.owner(k, k) == front.place;
+      if (!is_home && !contains(front.column_places[k], front.place)) continue;
       const int n = 3 * front.map.nodes(k);
-      const std::vector<int>& column = front.column_places[k];
-      const bool has_column = is_home || contains(column, front.place);
-      std::vector<double*> sums = has_column ? clear_sums(n) : std::vector<double*>();
+      const std::vector<double*>& sums = sums_of_panel[k] = list_panel(k);
+      for (std::size_t b = 0; b < blocks_.size(); ++b)
+        std::memset(sums[b], 0, sizeof(double) * static_cast<std::size_t>(n * blocks_[b].width));
       if (is_home)
         for (std::size_t b = 0; b < blocks_.size(); ++b)
           kernels_.multiply_by_d_inverse(numbers_.d_diagonal.data() + panel.pivots, numbers_.d_off.data() + panel.pivots, n,
                                          blocks_[b].width / 8, find_row(blocks_[b], list_slots(front, k).front()), sums[b]);
+      subtract_rows(front, numbers_.find_tiles(panel), k, behind, front.own_nodes(), sums);
+    }
+    for (int k = front.map.pivot_tiles(); k-- > 0;) {
+      const SharedPanel& panel = numbers_.shared[f][k];
+      const bool is_home = front.map.owner(k, k) == front.place;
+      const int n = 3 * front.map.nodes(k);
+      const std::vector<double*>& sums = sums_of_panel[k];
       const std::int32_t begin = front.row_begin[k + 1];
       const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[k + 2] : begin;
       const double* tiles = numbers_.find_tiles(panel);
-      if (has_column) subtract_rows(front, tiles, k, next, front.own_nodes(), sums);
+      if (!sums.empty()) subtract_rows(front, tiles, k, next, behind, sums);
       if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[k + 1], front.place))
         receive(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1), Arrival::kIsSet);
-      if (has_column) subtract_rows(front, tiles, k, begin, next, sums);
+      if (!sums.empty()) subtract_rows(front, tiles, k, begin, next, sums);
       if (!is_home) {
-        if (has_column) send_block(front.map.rank(front.map.owner(k, k)), find_tag(front.id, kAlongColumn), n, sums);
+        if (!sums.empty()) send_block(front.map.rank(front.map.owner(k, k)), find_tag(front.id, kAlongColumn), n, sums);
         continue;
       }
-      for (const std::int32_t place : column) add_block(front.map.rank(place), find_tag(front.id, kAlongColumn), n, sums);
+      for (const std::int32_t place : order_places(front.column_places[k], find_below(front, k), Critical::kIsLast))
+        add_block(front.map.rank(place), find_tag(front.id, kAlongColumn), n, sums);
       alignas(64) double solution[kMaxBlock * 16];
       const Ints slots = list_slots(front, k);
       const double* triangle = numbers_.panels.data() + panel.triangle;
@@ -328,7 +366,8 @@ class Solver {
         double* own = find_row(blocks_[b], slots.front());
         for (int c = 0; c < n; ++c) copy_row(solution + c * width, width, own + numbers_.order[panel.pivots + c] * width);
       }
-      for (const std::int32_t place : front.row_places[k]) send(front.map.rank(place), find_tag(front.id, kAlongRow), slots);
+      for (const std::int32_t place : order_places(front.row_places[k], k > 0 ? front.map.owner(k, k - 1) : -1, Critical::kIsFirst))
+        send(front.map.rank(place), find_tag(front.id, kAlongRow), slots);
     }
     for (const SumMessage& sums : front.from_children) send_sums(sums, kSolutions);
   }
@@ -341,16 +380,6 @@ class Solver {
     const double* from = tiles + std::int64_t{3} * (begin - front.row_begin[k + 1]) * n;
     for (std::size_t b = 0; b < blocks_.size(); ++b)
       kernels_.subtract_transposed(from, 3 * (end - begin), n, blocks_[b].width / 8, nodes_.data() + begin, blocks_[b].rows, sums[b], from);
-  }
-
-  /// Zeroed memory for n rows of each block.
-  std::vector<double*> clear_sums(int n) {
-    std::vector<double*> sums;
-    for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      sums.push_back(sums_ + b * kMaxBlock * 16);
-      std::memset(sums.back(), 0, sizeof(double) * static_cast<std::size_t>(n * blocks_[b].width));
-    }
-    return sums;
   }
 
   // ---- messages ----
@@ -404,17 +433,14 @@ class Solver {
     MPI_Recv(received_.data(), static_cast<int>(count), MPI_DOUBLE, rank, tag, plan_.comm, MPI_STATUS_IGNORE);
   }
 
-  /// n rows of each block, valid until the next call.
-  std::vector<const double*> receive_block(int rank, int tag, int n) {
+  /// n rows of each block.
+  void receive_block(int rank, int tag, int n, const std::vector<double*>& rows) {
     receive_numbers(rank, tag, static_cast<std::size_t>(n) * static_cast<std::size_t>(row_width_));
-    std::vector<const double*> in;
     const double* from = received_.data();
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      const int count = n * blocks_[b].width;
-      in.push_back(std::copy_n(from, count, sums_ + b * kMaxBlock * 16) - count);
-      from += count;
+      std::copy_n(from, n * blocks_[b].width, rows[b]);
+      from += n * blocks_[b].width;
     }
-    return in;
   }
 
   void send_block(int rank, int tag, int n, const std::vector<double*>& sums) {
@@ -442,7 +468,7 @@ class Solver {
   std::vector<Block> blocks_;
   Ints nodes_;  // of the current front
   int row_width_ = 0;
-  alignas(64) double sums_[kMaxBlock * kSolveColumns];
+  double* columns_ = nullptr;                         // Workspace::columns
   std::map<std::int32_t, std::vector<double>> kept_;  // by child
   std::list<std::vector<double>> messages_;
   std::vector<double> received_;
@@ -453,6 +479,9 @@ class Solver {
 
 Workspace make_workspace(const Plan& plan, const Numbers& numbers) {
   Workspace workspace;
+  std::int64_t panels = 0;
+  for (const SharedFront& front : plan.shared) panels = std::max<std::int64_t>(panels, front.map.pivot_tiles());
+  workspace.columns = Buffer(panels * kMaxBlock * kSolveColumns);
   for (int block = 0; block < kSolveColumns / kBlockColumns; ++block) {
     if (block < plan.room.solve_blocks)
       workspace.blocks.push_back(numbers.panels.data() + plan.room.solve_begin() + block * plan.count_block());
