@@ -1,8 +1,5 @@
 #include "precompute/ldlt/mailbox.hpp"
 
-#include <sched.h>
-#include <time.h>
-
 #include <cstring>
 #include <utility>
 
@@ -66,18 +63,6 @@ bool Mailbox::release() {
     at = is_done != 0 ? sent_.erase(at) : std::next(at);
   }
   return sent_.empty();
-}
-
-void Mailbox::rest() {
-  constexpr int kPatience = 200;
-  constexpr int kLongPatience = 2000;
-  ++fruitless_;
-  if (fruitless_ > kLongPatience) {
-    const timespec pause{0, 20'000};
-    nanosleep(&pause, nullptr);
-  } else if (fruitless_ > kPatience) {
-    sched_yield();
-  }
 }
 
 }  // namespace carillon::ldlt

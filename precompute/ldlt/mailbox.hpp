@@ -53,8 +53,8 @@ class Mailbox {
   std::optional<Letter> receive();
   /// Releases completed sends. True if none is pending.
   bool release();
-  /// Yields the core to other processes after some unsuccessful polls.
-  void rest();
+  /// Yields the core to other processes after some unsuccessful polls. is_expecting: nothing but a letter can end the wait.
+  void rest(bool is_expecting);
 
  private:
   struct Sent {

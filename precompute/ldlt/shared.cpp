@@ -92,7 +92,7 @@ void SharedFactoriser::work_off() {
     if (has_failed_) break;
     bool has_stepped = false;
     for (std::size_t f = 0; f < works_.size() && !has_stepped; ++f) has_stepped = !works_[f].is_done && step(static_cast<std::int32_t>(f));
-    if (!has_stepped) mailbox_.rest();
+    if (!has_stepped) mailbox_.rest(true);
   }
   if (has_failed_) works_.clear();
 }
@@ -108,7 +108,7 @@ void SharedFactoriser::drain() {
       if (const std::optional<Letter> letter = mailbox_.receive())
         has_failed_ = has_failed_ || letter->heading().kind == kAbort;
       else
-        mailbox_.rest();
+        mailbox_.rest(false);
     } catch (const std::bad_alloc&) {
       has_failed_ = true;
     }
