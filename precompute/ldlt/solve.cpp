@@ -10,6 +10,7 @@
 #include <list>
 #include <map>
 #include <numeric>
+#include <ranges>
 
 #include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/numeric.hpp"
@@ -241,18 +242,7 @@ class Solver {
     return slots;
   }
 
-  /// Places with the one that the next panel waits for first, or last where the others' messages have come before its own.
-  enum class Critical { kIsFirst, kIsLast };
-  static std::vector<int> order_places(std::vector<int> places, int critical, Critical where) {
-    const auto at = std::find(places.begin(), places.end(), critical);
-    if (at != places.end() && where == Critical::kIsFirst) std::rotate(places.begin(), at, at + 1);
-    if (at != places.end() && where == Critical::kIsLast) std::rotate(at, at + 1, places.end());
-    return places;
-  }
-  /// Place of the tile below diagonal tile k, -1: the last pivot tile.
-  static int find_below(const SharedFront& front, int k) { return k + 1 < front.map.pivot_tiles() ? front.map.owner(k + 1, k) : -1; }
-
-  static bool contains(const std::vector<int>& places, int place) { return std::binary_search(places.begin(), places.end(), place); }
+  static bool contains(const std::vector<int>& places, int place) { return std::find(places.begin(), places.end(), place) != places.end(); }
 
   /// Subtracts the tiles of column k, own nodes `begin` to `end`, times the solution there.
   void subtract_column(const SharedFront& front, const double* tiles, int k, std::int32_t begin, std::int32_t end,
@@ -288,7 +278,7 @@ class Solver {
       std::vector<double*>& in = solutions[k];
       if (home == front.place) {
         const Ints slots = list_slots(front, k);
-        for (const std::int32_t place : order_places(front.row_places[k], k > 0 ? front.map.owner(k, k - 1) : -1, Critical::kIsLast))
+        for (const int place : std::views::reverse(front.row_places[k]))  // the nearest comes last
           receive(front.map.rank(place), find_tag(front.id, kAlongRow), slots, Arrival::kIsAdded);
         for (const Block& block : blocks_) {
           double* own = find_row(block, slots.front());
@@ -297,8 +287,7 @@ class Solver {
           kernels_.trmm(numbers_.panels.data() + panel.triangle, n, block.width / 8, pivots, own);
           in.push_back(own);
         }
-        for (const std::int32_t place : order_places(column, find_below(front, k), Critical::kIsFirst))
-          send(front.map.rank(place), find_tag(front.id, kAlongColumn), slots);
+        for (const int place : column) send(front.map.rank(place), find_tag(front.id, kAlongColumn), slots);
       } else if (contains(column, front.place)) {
         in = list_panel(k);
         receive_block(front.map.rank(home), find_tag(front.id, kAlongColumn), n, in);
@@ -354,7 +343,7 @@ class Solver {
         if (!sums.empty()) send_block(front.map.rank(front.map.owner(k, k)), find_tag(front.id, kAlongColumn), n, sums);
         continue;
       }
-      for (const std::int32_t place : order_places(front.column_places[k], find_below(front, k), Critical::kIsLast))
+      for (const int place : std::views::reverse(front.column_places[k]))
         add_block(front.map.rank(place), find_tag(front.id, kAlongColumn), n, sums);
       alignas(64) double solution[kMaxBlock * 16];
       const Ints slots = list_slots(front, k);
@@ -366,8 +355,7 @@ class Solver {
         double* own = find_row(blocks_[b], slots.front());
         for (int c = 0; c < n; ++c) copy_row(solution + c * width, width, own + numbers_.order[panel.pivots + c] * width);
       }
-      for (const std::int32_t place : order_places(front.row_places[k], k > 0 ? front.map.owner(k, k - 1) : -1, Critical::kIsFirst))
-        send(front.map.rank(place), find_tag(front.id, kAlongRow), slots);
+      for (const int place : front.row_places[k]) send(front.map.rank(place), find_tag(front.id, kAlongRow), slots);
     }
     for (const SumMessage& sums : front.from_children) send_sums(sums, kSolutions);
   }

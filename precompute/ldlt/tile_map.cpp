@@ -91,23 +91,23 @@ int TileMap::find_last_column(int place) const {
   return column;
 }
 
-std::vector<int> TileMap::list_others(std::vector<int> places, int k) const {
-  std::sort(places.begin(), places.end());
-  places.erase(std::unique(places.begin(), places.end()), places.end());
-  std::erase(places, owner(k, k));
-  return places;
+std::vector<int> TileMap::list_others(const std::vector<int>& places, int k) const {
+  std::vector<int> others;
+  for (const int place : places)
+    if (place != owner(k, k) && std::find(others.begin(), others.end(), place) == others.end()) others.push_back(place);
+  return others;
 }
 
 std::vector<int> TileMap::list_row(int k) const {
   std::vector<int> places;
-  for (int j = 0; j < k; ++j) places.push_back(owner(k, j));
-  return list_others(std::move(places), k);
+  for (int j = k; j-- > 0;) places.push_back(owner(k, j));
+  return list_others(places, k);
 }
 
 std::vector<int> TileMap::list_column(int k) const {
   std::vector<int> places;
   for (int i = k + 1; i < tiles(); ++i) places.push_back(owner(i, k));
-  return list_others(std::move(places), k);
+  return list_others(places, k);
 }
 
 std::vector<double> TileMap::count_operations() const {

@@ -38,7 +38,8 @@ class TileMap {
   bool has_whole_columns() const { return row_owner_.size() == ranks_.size(); }
   /// Last column in which a place has a tile, -1: none.
   int find_last_column(int place) const;
-  /// Places, except that of the diagonal tile, with tiles in row k before the diagonal, and in column k behind it; ascending.
+  /// Places, except that of the diagonal tile, with tiles in row k before the diagonal, and in column k behind it; those with a tile near
+  /// the diagonal first, as the next panels wait for them.
   std::vector<int> list_row(int k) const;
   std::vector<int> list_column(int k) const;
   /// Calls visit(i) for the tiles of column k below the diagonal that are on place `from` and needed by place `to` for its updates, as rows
@@ -60,7 +61,7 @@ class TileMap {
 
  private:
   double cost(int i, int j) const;
-  std::vector<int> list_others(std::vector<int> places, int k) const;
+  std::vector<int> list_others(const std::vector<int>& places, int k) const;
 
   std::vector<std::int32_t> starts_;  // (tiles + 1)
   int pivot_tiles_ = 0;
