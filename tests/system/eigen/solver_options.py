@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Methods and options of the solver from outside: both methods give the same proven bank; options of the eigensolver and unused options are
-one error with exit code 2. Runs on a bar with 21 modes."""
+"""Methods and options of the solver from outside: both methods, and MUMPS, give the same proven bank; options of the eigensolver and
+unused options are one error with exit code 2. Runs on a bar with 21 modes."""
 import json
 import os
 import pathlib
@@ -63,12 +63,12 @@ class SolverOptions(unittest.TestCase):
             self.assertIn(word, done.stderr)
         self.assertEqual([file.name for file in folder.file.iterdir()], ["job.json"])
 
-    def test_both_methods_give_the_same_proven_bank(self):
+    def test_methods_and_factorisations_give_the_same_proven_bank(self):
         self.assertEqual(len(self.wanted), 21)
-        for method in ("block-lanczos", "krylov-schur"):
+        for solver in ({"method": "block-lanczos"}, {"method": "krylov-schur"}, {"factorisation": "mumps"}):
             for ranks in (1, 2):
-                with self.subTest(method=method, ranks=ranks):
-                    folder = Folder(solver={"method": method})
+                with self.subTest(solver=solver, ranks=ranks):
+                    folder = Folder(solver=solver)
                     done = folder.run(ranks=ranks)
                     self.assertEqual(done.returncode, 0, done.stderr)
                     numpy.testing.assert_allclose(folder.frequencies(), self.wanted, rtol=1e-8)
