@@ -18,7 +18,8 @@ struct HandedOver {
 };
 inline constexpr HandedOver kHandedOver[] = {
     {"study", "carillon-study", "Studies: scaling JOB.json, advise BODY --cents 5; see carillon study --help"},
-    {"match", "carillon-tune", "The material of a body from a recording: match JOB.json SOUND.wav; see carillon match --help", true}};
+    {"match", "carillon-tune", "The material of a body from a recording: match JOB.json SOUND.wav; see carillon match --help", true},
+    {"sensitivity", "carillon-tune", "Where to cut a body: sensitivity BANK; see carillon sensitivity --help", true}};
 
 /// Index of the command name, after the global options; argc if there is none.
 int find_command(int argc, char** argv);

@@ -1,6 +1,7 @@
-"""carillon-tune: bodies matched to recordings.
+"""carillon-tune: bodies matched to recordings, and where to cut them.
 
     carillon-tune match JOB.json SOUND.wav|PEAKS.csv [-o FOLDER] [--mass 0.2126kg] [--tolerance 0.05mm]
+    carillon-tune sensitivity BANK [--cut 0.1mm] [--at X,Y,Z --radius 10mm] [-o map.csv|png|glb]
 
 Exit codes: 0 done, 2 bad input, 3 a solve failed, 4 system error.
 """
@@ -14,6 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: threads gain
 
 try:
     import match
+    import sensitivity
 except ImportError as error:
     print(f"carillon-tune: error: {error}; install python3-numpy, python3-scipy and python3-h5py", file=sys.stderr)
     sys.exit(4)
@@ -28,6 +30,7 @@ def make_parser():
     parser.add_argument("--version", action="version", version=f"carillon-tune {VERSION}")
     commands = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
     match.add_command(commands)
+    sensitivity.add_command(commands)
     return parser
 
 

@@ -1,0 +1,282 @@
+"""carillon sensitivity: change of each frequency of a bank by removed material, and by the constants of the material."""
+import argparse
+import csv
+import io
+import json
+import math
+import pathlib
+import struct
+import subprocess
+
+import h5py
+import numpy
+import scipy.spatial
+
+import programs
+from errors import InputError
+from match import LENGTH_UNITS, read_quantity
+
+SAME_SIDE = 0.5  # cosine of the largest angle between the normals of a spot
+
+
+def read_point(text):
+    try:
+        point = numpy.array([float(word) for word in text.split(",")])
+    except ValueError:
+        point = numpy.array([])
+    if point.shape != (3,) or not numpy.isfinite(point).all():
+        raise argparse.ArgumentTypeError(f"{text!r}: give three coordinates in metres, like 0.1,0,0.02")
+    return point
+
+
+def add_command(commands):
+    words = commands.add_parser(
+        "sensitivity",
+        help="change of each frequency by removed material and by the constants of the material",
+        description='Changes of the lowest modes in cents, of a bank whose job has "sensitivities": 30. With --at: by a spot whose depth '
+        "falls smoothly to 0 at the radius; otherwise by a cut of the whole surface, with the places where a cut lowers and raises most.",
+    )
+    words.add_argument("bank", metavar="BANK", type=pathlib.Path)
+    words.add_argument("--cut", type=read_quantity(LENGTH_UNITS), default=1e-4, metavar="0.1mm", help="depth of the cut (default: 0.1mm)")
+    words.add_argument("--at", type=read_point, metavar="X,Y,Z", help="centre of a spot in metres, mesh axes; the nearest surface is taken")
+    words.add_argument(
+        "--radius", type=read_quantity(LENGTH_UNITS), metavar="10mm", help="radius of the spot (default: a tenth of the body)"
+    )
+    words.add_argument("--mode", type=int, default=1, metavar="K", help="mode of the picture and of the GLB file (default: 1)")
+    words.add_argument(
+        "-o",
+        "--output",
+        type=pathlib.Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="also write FILE: .csv (densities of all modes over the surface), .png (picture of a mode), .glb (coloured body); repeatable",
+    )
+    words.add_argument("--bin", metavar="FOLDER", help="folder of carillon-bank and carillon-draw (default: next to this program)")
+    words.add_argument("--json", action="store_true", help="print one JSON document")
+    words.set_defaults(run=run)
+
+
+class Map:
+    """Sites S of a bank with densities of n modes; docs/bank-format.md, sensitivities."""
+
+    def __init__(self, path, program):
+        rows = list(csv.DictReader(io.StringIO(run_program([program, "info", "--csv", "--modes", "100000", path]))))
+        is_packed = path.read_bytes()[:17].startswith(b"CARILLON BANK 2.")
+        data = io.BytesIO(run_program([program, "unpack", path, "-"], is_text=False)) if is_packed else path
+        with h5py.File(data, "r") as bank:
+            if "sensitivity" not in bank:
+                raise InputError(f'{path}: has no sensitivities; compute it again with "sensitivities": 30 in its job')
+            group = bank["sensitivity"]
+            self.modes = group["modes"][:]
+            self.density = group["density"][:] * group["scale"][:]  # (S, C) cent / (mm m^2)
+            self.normal, self.area_m2 = group["normal"][:].astype(float), group["area_m2"][:].astype(float)
+            self.doubtful = group["doubtful"][:] != 0
+            self.vertex = group["vertex"][:]
+            self.parameters = json.loads(group["parameters"][()].rstrip(b"\0") or "[]")
+            self.by_parameter = group["by_parameter"][:]
+            self.vertices, self.triangles = bank["mesh/vertices"][:], bank["mesh/triangles"][:]
+            self.poisson_ratio = float(bank["material/poisson_ratio"][()])
+            job = json.loads(bank["provenance"][()].rstrip(b"\0"))
+        while "of" in job:  # a packed or edited bank
+            job = job["of"]
+        body = job.get("body", {})
+        self.thickness_m = body.get("wall_m", body.get("thickness_m"))
+        self.place = self.vertices[self.vertex]
+        self.count = len(self.by_parameter)
+        self.freq_hz = numpy.array([float(row["heard_frequency_hz"]) for row in rows])[: self.count]
+        self.mesh_hz = numpy.array([float(row["frequency_hz"]) for row in rows])[: self.count]
+        self.kind = [row["kind"] for row in rows][: self.count]
+
+    def calc_changes(self, depth_m):
+        """(n) cents, to first order; of modes within 1 % by the eigenvalues of their matrix."""
+        entry = self.density.T @ (self.area_m2 * depth_m * 1e3)
+        changes = entry[: self.count].copy()
+        cents = 1200 * numpy.log2(self.mesh_hz / self.mesh_hz[0])
+        first = 0
+        while first < self.count:
+            last = first + 1
+            while last < self.count and self.mesh_hz[last] < 1.01 * self.mesh_hz[last - 1]:
+                last += 1
+            matrix = numpy.diag(cents[first:last])
+            for (i, j), value in zip(self.modes, entry):
+                if first <= i and j < last:
+                    matrix[i - first, j - first] += value
+                    matrix[j - first, i - first] = matrix[i - first, j - first]
+            changes[first:last] = numpy.linalg.eigvalsh(matrix) - cents[first:last]
+            first = last
+        return changes
+
+    def list_constants(self):
+        """[name, (n) d ln f / d ln constant]; of Poisson's ratios d ln f / d nu."""
+        found = [(name.removesuffix("_pa").removesuffix("_kg_m3"), self.by_parameter[:, i]) for i, name in enumerate(self.parameters)]
+        if "poisson_ratio" in self.parameters:  # nu = E / 2 G - 1
+            by_nu = self.by_parameter[:, self.parameters.index("poisson_ratio")]
+            found.insert(2, ("shear_modulus", -(1 + self.poisson_ratio) * by_nu))
+        if self.thickness_m:
+            found.append(("thickness", self.calc_by_thickness()))
+        return found
+
+    def calc_by_thickness(self):
+        """(n) d ln f / d ln thickness, half of it on each side: of sites with another side at that distance, not of rims."""
+        tree = scipy.spatial.cKDTree(self.place)
+        distance, other = tree.query(self.place - self.thickness_m * self.normal, k=min(4, len(self.place)))  # an edge has several sites
+        is_opposite = (self.normal[:, None] * self.normal[other]).sum(axis=2) < -0.8
+        is_face = ((distance < 0.35 * self.thickness_m) & is_opposite).any(axis=1)
+        share = 1e-4
+        depth = numpy.where(is_face, 0.5 * share * self.thickness_m, 0.0)
+        return -self.calc_changes(depth) * math.log(2) / 1200 / share
+
+    def make_spot(self, at_m, radius_m, cut_m):
+        """Depth (S) of a spot around the nearest site, on its side of the surface."""
+        nearest = numpy.linalg.norm(self.place - at_m, axis=1).argmin()
+        share = numpy.linalg.norm(self.place - self.place[nearest], axis=1) / radius_m
+        is_same_side = self.normal @ self.normal[nearest] > SAME_SIDE
+        depth = numpy.where((share < 1) & is_same_side, cut_m * (1 - numpy.minimum(share, 1) ** 2) ** 2, 0.0)
+        return nearest, depth
+
+    def find_sites(self):
+        """(T, 3) the site of each corner: of those of its vertex, the one whose normal is nearest to the triangle's."""
+        corners = self.vertices[self.triangles]
+        normal = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        order = numpy.argsort(self.vertex, kind="stable")
+        first = numpy.searchsorted(self.vertex[order], self.triangles)
+        best, most = order[first], numpy.full(self.triangles.shape, -numpy.inf)
+        for step in range(int(numpy.bincount(self.vertex).max())):
+            site = order[numpy.minimum(first + step, len(order) - 1)]
+            along = numpy.where(self.vertex[site] == self.triangles, (self.normal[site] * normal[:, None]).sum(axis=2), -numpy.inf)
+            best, most = numpy.where(along > most, site, best), numpy.maximum(along, most)
+        return best
+
+
+def run_program(words, is_text=True):
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=is_text)
+    if done.returncode != 0:
+        error = done.stderr if is_text else done.stderr.decode(errors="replace")
+        raise InputError(error.strip().removeprefix(f"{pathlib.Path(words[0]).name}: "))
+    return done.stdout
+
+
+def show_place(place):
+    return "(" + ", ".join(f"{x:.4g}" for x in place) + ")"
+
+
+def list_spot(sites, changes, out):
+    out.append(f"{'mode':>5} {'Hz':>10}  {'cents':>8}  kind")
+    for k in range(sites.count):
+        out.append(f"{k + 1:>5} {sites.freq_hz[k]:>10.2f}  {changes[k]:>+8.2f}  {sites.kind[k]}")
+
+
+def list_whole(sites, changes, constants, out):
+    trusted = numpy.flatnonzero(~sites.doubtful)
+    out.append(f"{'mode':>5} {'Hz':>10}  {'cents':>8}  {'lowered most at [m]':<34}{'raised most at [m]':<34}kind")
+    for k in range(sites.count):
+        density = sites.density[trusted, k]
+        low, high = (show_place(sites.place[trusted[i]]) for i in (density.argmin(), density.argmax()))
+        out.append(f"{k + 1:>5} {sites.freq_hz[k]:>10.2f}  {changes[k]:>+8.2f}  {low:<34}{high:<34}{sites.kind[k]}")
+    width = max(len(name) for name, _ in constants) + 2
+    note = "cents by 1 % of a constant (Poisson's ratios: by 0.01); shear modulus: at constant Young's modulus"
+    out += ["", note, f"{'mode':>5}" + "".join(f"{name:>{width}}" for name, _ in constants)]
+    for k in range(sites.count):
+        out.append(f"{k + 1:>5}" + "".join(f"{12 / math.log(2) * values[k]:>+{width}.2f}" for _, values in constants))
+
+
+def write_csv(sites, path):
+    with path.open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow("x_m y_m z_m nx ny nz area_m2 doubtful".split() + [f"mode_{k + 1}_cent_per_mm_m2" for k in range(sites.count)])
+        for s in range(len(sites.vertex)):
+            fixed = [*sites.place[s], *sites.normal[s], sites.area_m2[s]]
+            numbers = [f"{x:.8g}" for x in fixed] + [int(sites.doubtful[s])]
+            table.writerow(numbers + [f"{x:.6g}" for x in sites.density[s, : sites.count]])
+
+
+def choose_colours(density, doubtful):
+    """(S, 3) linear RGB: blue lowers, white does not matter, red raises, grey is doubtful."""
+    most = numpy.abs(density[~doubtful]).max(initial=0.0)
+    share = numpy.clip(density / most, -1, 1) if most > 0 else numpy.zeros_like(density)
+    ends = numpy.where(share[:, None] < 0, [0.05, 0.2, 0.6], [0.6, 0.03, 0.06])
+    colours = 0.95 + numpy.abs(share[:, None]) * (ends - 0.95)
+    colours[doubtful] = 0.35
+    return colours
+
+
+def write_glb(sites, mode, path):
+    """The body as glTF 2.0 with vertex colours."""
+    arrays = [
+        (sites.place.astype("<f4"), "VEC3", 5126, 34962),
+        (sites.normal.astype("<f4"), "VEC3", 5126, 34962),
+        (choose_colours(sites.density[:, mode], sites.doubtful).astype("<f4"), "VEC3", 5126, 34962),
+        (sites.find_sites().astype("<u4").reshape(-1), "SCALAR", 5125, 34963),
+    ]
+    views, accessors, binary = [], [], b""
+    for values, kind, component, target in arrays:
+        views.append({"buffer": 0, "byteOffset": len(binary), "byteLength": values.nbytes, "target": target})
+        accessors.append({"bufferView": len(views) - 1, "componentType": component, "count": len(values), "type": kind})
+        binary += values.tobytes()
+    accessors[0] |= {"min": arrays[0][0].min(axis=0).tolist(), "max": arrays[0][0].max(axis=0).tolist()}
+    name = f"mode {mode + 1}, {sites.freq_hz[mode]:.1f} Hz"
+    root = {
+        "asset": {"version": "2.0", "generator": "carillon sensitivity"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": name}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1, "COLOR_0": 2}, "indices": 3, "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.7}}],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(binary)}],
+    }
+    text = json.dumps(root).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + len(binary))
+    path.write_bytes(head + struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary)
+
+
+def run(arguments):
+    wrong = [path for path in arguments.output if path.suffix.lower() not in (".csv", ".png", ".glb")]
+    if wrong:
+        raise InputError(f"{wrong[0]}: the output ends in {wrong[0].suffix or 'nothing'}; give a .csv, .png or .glb file")
+    if arguments.radius and arguments.at is None:
+        raise InputError("--radius is of a spot; give its centre with --at X,Y,Z")
+    sites = Map(arguments.bank, programs.find_program(arguments.bin, "carillon-bank"))
+    if not 1 <= arguments.mode <= sites.count:
+        raise InputError(f"--mode {arguments.mode}: {arguments.bank} has sensitivities of the modes 1 to {sites.count}")
+    out = []
+    if arguments.at is not None:
+        size = numpy.linalg.norm(numpy.ptp(sites.place, axis=0))
+        radius = arguments.radius or 0.1 * size
+        nearest, depth = sites.make_spot(arguments.at, radius, arguments.cut)
+        touched = depth > 0
+        if touched.sum() < 8:
+            raise InputError(
+                f"--radius {radius:g}: the spot has {touched.sum()} vertices of the surface; give a larger one or a finer mesh"
+            )
+        volume = (sites.area_m2 * depth).sum()
+        out.append(
+            f"a spot of {1e3 * arguments.cut:g} mm at {show_place(sites.place[nearest])} m, radius {1e3 * radius:g} mm: "
+            f"{1e9 * volume:.3g} mm3 removed"
+        )
+        if (touched & sites.doubtful).any():
+            out.append("warning: the spot is near an inward edge or fixed nodes, where the changes are 40 to 90 % too low")
+        changes, constants = sites.calc_changes(depth), []
+        list_spot(sites, changes, out)
+    else:
+        out.append(f"{1e3 * arguments.cut:g} mm removed from the whole surface, {1e4 * sites.area_m2.sum():.4g} cm2")
+        changes, constants = sites.calc_changes(numpy.full(len(sites.area_m2), arguments.cut)), sites.list_constants()
+        list_whole(sites, changes, constants, out)
+    for path in arguments.output:
+        if path.suffix.lower() == ".csv":
+            write_csv(sites, path)
+        elif path.suffix.lower() == ".glb":
+            write_glb(sites, arguments.mode - 1, path)
+        else:
+            draw = programs.find_program(arguments.bin, "carillon-draw")
+            run_program([draw, "sensitivities", arguments.bank, "-o", path, "--modes", arguments.mode])
+        out.append(str(path))
+    rows = [
+        {"mode": k + 1, "hz": sites.freq_hz[k], "kind": sites.kind[k], "cents": changes[k]}
+        | {name: values[k] for name, values in constants}
+        for k in range(sites.count)
+    ]
+    return "\n".join(out), {"cut_m": arguments.cut, "modes": rows}

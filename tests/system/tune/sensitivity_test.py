@@ -1,0 +1,135 @@
+#!/usr/bin/python3
+"""carillon sensitivity against new solves of a thinner bar and of other materials, and its files.
+
+usage: sensitivity_test.py BIN_DIR
+"""
+import json
+import pathlib
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import h5py
+import numpy
+
+BIN = pathlib.Path(sys.argv.pop(1)).resolve()
+STEEL = {"young_modulus_pa": 2e11, "poisson_ratio": 0.29, "density_kg_m3": 7850, "damping": {"internal_friction": {"tan_phi": 2e-4}}}
+BAR = {"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.012, "nodes": 4000}
+
+
+class Sensitivity(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.scratch = tempfile.TemporaryDirectory(prefix="carillon-sensitivity-")
+        cls.folder = pathlib.Path(cls.scratch.name)
+        cls.solve("bar", sensitivities=20)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.scratch.cleanup()
+
+    @classmethod
+    def solve(cls, name, body=None, material=None, **more):
+        """Frequencies of the mesh."""
+        job = {"body": BAR | (body or {}), "material": material or STEEL, "band_hz": [20, 15000], "bank": f"{name}.hdf"} | more
+        (cls.folder / f"{name}.json").write_text(json.dumps(job))
+        subprocess.run([BIN / "carillon-precompute", "-q", f"{name}.json"], cwd=cls.folder, check=True, stderr=subprocess.DEVNULL)
+        with h5py.File(cls.folder / f"{name}.hdf") as bank:
+            return bank["modes/frequency_hz"][:]
+
+    def run_command(self, *words, code=0):
+        done = subprocess.run([BIN / "carillon", "sensitivity", *map(str, words)], cwd=self.folder, capture_output=True, text=True)
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        return done.stdout if code == 0 else done.stderr
+
+    def ask(self, *words):
+        return json.loads(self.run_command(*words, "--json"))["modes"]
+
+    def compare(self, stated, above, below, step, median=0.01, worst=0.05):
+        """stated: d ln f / d parameter; above, below: frequencies at the parameter +- step."""
+        true = numpy.log(above / below) / (2 * step)
+        error = numpy.abs(numpy.array(stated) - true) / numpy.maximum(numpy.abs(true), 0.05 * numpy.abs(true).max())
+        self.assertLess(numpy.median(error), median)
+        self.assertLess(error.max(), worst)
+
+    def test_constants_and_thickness_are_those_of_new_solves(self):
+        modes = self.ask("bar.hdf")
+        thick, thin = (self.solve("moved", {"thickness_m": 0.012 * share}) for share in (1.005, 0.995))
+        self.compare([mode["thickness"] for mode in modes], thick[: len(modes)], thin[: len(modes)], 0.005)
+        high, low = (self.solve("moved", material=STEEL | {"poisson_ratio": nu}) for nu in (0.295, 0.285))
+        self.compare([mode["poisson_ratio"] for mode in modes], high[: len(modes)], low[: len(modes)], 0.005, 1e-3, 1e-2)
+        for mode in modes:
+            self.assertEqual((mode["young_modulus"], mode["density"], mode["size"]), (0.5, -0.5, -1.0))
+
+    def test_moduli_of_wood_are_those_of_new_solves(self):
+        wood = {
+            "orthotropic": {
+                "young_modulus_pa": [11e9, 0.9e9, 0.5e9],
+                "shear_modulus_pa": [0.7e9, 0.04e9, 0.75e9],
+                "poisson_ratio": [0.4, 0.45, 0.4],
+            },
+            "density_kg_m3": 430,
+            "damping": {"internal_friction": {"tan_phi": 8e-3}},
+        }
+        self.solve("wood", material=wood, sensitivities=8, band_hz=[20, 6000])
+        modes = self.ask("wood.hdf")
+        for key, place, name in (("young_modulus_pa", 0, "young_modulus_pa.1"), ("shear_modulus_pa", 0, "shear_modulus_pa.12")):
+            ends = []
+            for share in (1.01, 0.99):
+                values = list(wood["orthotropic"][key])
+                values[place] *= share
+                changed = wood | {"orthotropic": wood["orthotropic"] | {key: values}}
+                ends.append(self.solve("moved", material=changed, band_hz=[20, 6000])[: len(modes)])
+            self.compare([mode[name] for mode in modes], *ends, 0.01, 1e-3, 1e-2)
+
+    def test_files_hold_the_densities(self):
+        self.run_command("bar.hdf", "-o", "map.csv", "-o", "map.glb", "-o", "map.png", "--mode", "2")
+        table = numpy.genfromtxt(self.folder / "map.csv", delimiter=",", names=True)
+        with h5py.File(self.folder / "bar.hdf") as bank:
+            group = bank["sensitivity"]
+            count = len(group["by_parameter"])
+            density = group["density"][:, :count] * group["scale"][:count]
+            triangles = len(bank["mesh/triangles"])
+        self.assertEqual(len(table), len(density))
+        numpy.testing.assert_allclose(table["mode_2_cent_per_mm_m2"], density[:, 1], rtol=1e-4, atol=1e-6 * numpy.abs(density).max())
+        sides = 2 * (0.3 * 0.03 + 0.3 * 0.012 + 0.03 * 0.012)
+        self.assertAlmostEqual(table["area_m2"].sum(), sides, delta=1e-6 * sides)
+        data = (self.folder / "map.glb").read_bytes()
+        magic, version, length, size, kind = struct.unpack("<4sIII4s", data[:20])
+        self.assertEqual((magic, version, length, kind), (b"glTF", 2, len(data), b"JSON"))
+        root = json.loads(data[20 : 20 + size])
+        self.assertEqual([one["count"] for one in root["accessors"]], [len(density)] * 3 + [3 * triangles])
+        self.assertEqual((self.folder / "map.png").read_bytes()[:4], b"\x89PNG")
+
+    def test_a_spot_changes_modes_where_they_move_or_bend(self):
+        # In the middle the first bending mode bends most: less material lowers it; at the end it only moves: less raises it.
+        middle, end = (self.ask("bar.hdf", "--at", f"{x},0,0.006", "--radius", "14mm")[0]["cents"] for x in self.find_middle_and_end())
+        self.assertLess(middle, -0.05)
+        self.assertGreater(end, 0.05)
+
+    def find_middle_and_end(self):
+        with h5py.File(self.folder / "bar.hdf") as bank:
+            along = bank["mesh/vertices"][:, 0]
+        return 0.5 * (along.min() + along.max()), along.max()
+
+    def test_bad_input_is_one_clear_error(self):
+        self.solve("plain")
+        for words, expected in (
+            (("plain.hdf",), '"sensitivities": 30'),
+            (("none.hdf",), "no such file"),
+            (("bar.hdf", "-o", "map.txt"), "give a .csv, .png or .glb"),
+            (("bar.hdf", "--mode", "99"), "modes 1 to"),
+            (("bar.hdf", "--cut", "2"), "unit"),
+            (("bar.hdf", "--radius", "1mm"), "--at"),
+            (("bar.hdf", "--at", "0,0", "--radius", "1mm"), "three coordinates"),
+            (("bar.hdf", "--at", "0,0,0", "--radius", "1um"), "finer mesh"),
+        ):
+            error = self.run_command(*words, code=2)
+            self.assertIn(expected, error)
+            self.assertEqual(len(error.strip().splitlines()), 1, error)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
