@@ -1,0 +1,317 @@
+"""What a tuning may change: each body is a function of a few parameters, with a mesh and a derivative of its frequencies.
+
+A Moved body has one mesh whose nodes move along fixed fields, X = X0 + sum p_k F_k, p_k being depths in m. So shapes of modes stay comparable
+vertex by vertex, and the derivatives follow from the sensitivities of the bank with the normal part of F_k (docs/equations.md, E7a).
+"""
+import dataclasses
+import json
+import pathlib
+import re
+
+import numpy
+import scipy.spatial
+
+import grid
+import mesh_file
+import measuring
+from errors import InputError
+
+EDGES_ALONG = 24  # elements along a bar on the coarse mesh
+END_SHARE = 0.46  # of the length: the cut ends there
+MAX_SHARE = 0.3  # largest step, of the depth that may go
+AWAY_COS = 0.3  # of normals: the other side of a wall
+KEY_NODES = 16000  # of a body without a number of nodes, on the fine mesh
+KEY_STEP = 0.05  # difference quotient of a job key, of its value
+
+
+def read_length(text):
+    """'3mm', '0.02 mm' or metres. InputError."""
+    word = text.strip()
+    scale = 1e-3 if word.endswith("mm") else 1.0
+    try:
+        value = scale * float(word.removesuffix("mm").removesuffix("m"))
+    except ValueError:
+        value = -1.0
+    if not 0 <= value < 100:
+        raise InputError(f"{text!r}: give a length like 3mm")
+    return value
+
+
+@dataclasses.dataclass(frozen=True)
+class Moved:
+    """nodes (N, 3) m, tets (E, 10), fields (K, N, 3), names (K) of the parameters, low, high and step (K) m. smooth: parameters are
+    neighbours in their order, and a design is better without jumps between them."""
+
+    job: dict
+    nodes: numpy.ndarray
+    tets: numpy.ndarray
+    fields: numpy.ndarray
+    names: list
+    low: numpy.ndarray
+    high: numpy.ndarray
+    step: numpy.ndarray
+    marks: numpy.ndarray  # (K, K) parameters to depths at the places of the names
+    smooth: bool = False
+    mesh: object = None  # the MeshFile whose node sets stay
+    volumes: numpy.ndarray | None = None  # (K) m^2, of material for each m of depth
+    floor: str = "no material can be added there"
+    ceiling: str = "the minimum wall is reached there"
+
+    def place(self, depths_m):
+        return self.nodes + numpy.tensordot(depths_m, self.fields, 1)
+
+    @property
+    def is_length(self):
+        return numpy.ones(len(self.names), bool)
+
+    def refresh(self):
+        """Whether new derivatives may help where a step failed: these are exact to first order."""
+        return False
+
+    def get_surfaces(self, _first, last):
+        """((positions, triangles) before, after) of two States."""
+        triangles = grid.find_surface(self.tets)
+        return (self.nodes, triangles), (self.place(last.p), triangles)
+
+    def make_job(self, depths_m, folder, name="body.msh"):
+        path = pathlib.Path(folder) / name
+        if self.mesh is None:
+            grid.write_msh(path, self.place(depths_m), self.tets)
+        else:
+            self.mesh.nodes = self.place(depths_m).tolist()
+            self.mesh.write(path)
+        dropped = ("body", "accuracy_cents", "shape", "mesh_scale")
+        return {key: value for key, value in self.job.items() if key not in dropped} | {"mesh": str(path.resolve())}
+
+    def calc_entries(self, solution, depths_m):
+        """(C, K) cents per m of each parameter for the columns of solution.sites."""
+        sites = solution.sites
+        apart, node = scipy.spatial.cKDTree(self.place(depths_m)).query(solution.vertices[sites.vertex])
+        if apart.max() > 1e-6 * numpy.ptp(self.nodes, axis=0).max():
+            raise InputError("the bank has vertices that the mesh has not")
+        inwards = -numpy.einsum("ksx,sx->ks", self.fields[:, node], sites.normal)
+        return 1e3 * ((inwards * sites.area_m2) @ sites.density).T
+
+    def calc_jacobian(self, state, groups=None):
+        """(groups, K) cents per m at a State: the mean of the modes of each group, which off-diagonal entries do not change."""
+        entries = self.calc_entries(state.solution, state.p)
+        of = {int(i): c for c, (i, j) in enumerate(state.solution.sites.columns) if i == j}
+        return numpy.array([numpy.mean([entries[of[m]] for m in group], axis=0) for group in groups or state.groups])
+
+
+def find_bases(knots, spacing, along):
+    """(knots, ...) cubic B-splines centred at k * spacing, mirrored at 0. They are positive with the sum 1 or less: where all coefficients
+    lie between two bounds, the depth does too."""
+
+    def spline(u):
+        u = numpy.abs(u)
+        return numpy.where(u < 1, 2 / 3 - u**2 + u**3 / 2, numpy.where(u < 2, (2 - numpy.minimum(u, 2)) ** 3 / 6, 0))
+
+    at = numpy.abs(along) / spacing
+    return numpy.array([spline(at - k) + (spline(at + k) if k else 0) for k in range(knots)])
+
+
+def make_undercut(job, fineness, knots=6, side="z-min", wall_m=None):
+    """The bar of a job, cut from one side by knots along its length. fineness: of the mesh, 1 is coarse."""
+    body = job["body"]
+    sizes = [body.get(key) for key in ("length_m", "width_m")] + [body.get("thickness_m", body.get("height_m"))]
+    if body.get("shape") not in ("bar", "plate", "box") or not all(sizes):
+        raise InputError('an undercut needs "body": {"shape": "bar", "length_m": ..., "width_m": ..., "thickness_m": ...}')
+    length, width, thickness = sizes
+    if length < max(width, thickness):
+        raise InputError("an undercut runs along x: length_m must be the largest size")
+    if job.get("fixed"):
+        raise InputError('an undercut moves the mesh of a free bar; leave out "fixed"')
+    if side not in ("z-min", "z-max"):
+        raise InputError(f"--remove {side}: a bar is cut from z-min or z-max")
+    wall = thickness / 4 if wall_m is None else wall_m
+    if not 0 < wall < thickness:
+        raise InputError(f"--wall: between 0 and the thickness of {1e3 * thickness:g} mm")
+    edge = length / EDGES_ALONG
+    cells = [EDGES_ALONG, max(2, 2 * round(width / edge / 2)), max(1, round(0.8 * thickness / edge))]
+    cells = [2 * max(1, round(fineness * cells[0] / 2)), 2 * max(1, round(fineness * cells[1] / 2)), max(1, round(fineness * cells[2]))]
+    places, tets = grid.make_grid(cells)
+    used, tets = grid.tidy(places, tets)
+    places = places[used] - 0.5
+    nodes = places * [length, width, thickness]
+    spacing = END_SHARE * length / (knots + 1)
+    up = 1 if side == "z-min" else -1
+    bases = find_bases(knots, spacing, nodes[:, 0])
+    fields = numpy.zeros((knots, len(nodes), 3))
+    fields[:, :, 2] = up * bases * (0.5 - up * places[:, 2])
+    top = numpy.full(knots, thickness - wall)
+    at = numpy.arange(knots) * spacing
+    names = [f"{1e3 * x:.1f} mm from the middle" for x in at]
+    marks = find_bases(knots, spacing, at).T
+    return Moved(job, nodes, tets, fields, names, numpy.zeros(knots), top, MAX_SHARE * top, marks, smooth=True)
+
+
+def read_mesh(job, job_file, folder, mesher):
+    """The MeshFile of a job: its mesh, or its body meshed by carillon-mesh with elements of ten nodes. InputError."""
+    base = pathlib.Path(job_file).resolve().parent
+    if "mesh" in job:
+        mesh = mesh_file.MeshFile(base / job["mesh"])
+    else:
+        body = dict(job.get("body", {}))
+        words = [str(base / body.pop("surface"))] if "surface" in body else []
+        for key, value in body.items():
+            words += [f"--{re.sub('_(m|deg)$', '', key).replace('_', '-')}", str(value)]
+        path = pathlib.Path(folder) / "start.msh"
+        measuring.run_part([mesher, *words, "--order", "2", "-q", "-o", path], folder, job_file)
+        mesh = mesh_file.MeshFile(path)
+    if not mesh.tets or len(mesh.tets[0]) != 10:
+        raise InputError(f"{job_file}: a map needs a mesh of ten-node tetrahedra: carillon-mesh ... --order 2")
+    return mesh
+
+
+def find_normals(points, triangles):
+    """Unit normals (N, 3) at the vertices of a surface, weighted by area, and areas (N); 0 off the surface."""
+    corners = points[triangles]
+    product = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    normal, area = numpy.zeros_like(points), numpy.zeros(len(points))
+    for k in range(3):
+        numpy.add.at(normal, triangles[:, k], product / 3)
+        numpy.add.at(area, triangles[:, k], numpy.linalg.norm(product, axis=1) / 3)
+    return normal / numpy.maximum(numpy.linalg.norm(normal, axis=1, keepdims=True), 1e-30), area
+
+
+def find_wall(points, triangles, at, inwards):
+    """Way (n) from points `at` along `inwards` to the other side of the body; inf if none."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    result = numpy.full(len(at), numpy.inf)
+    for number, (origin, ray) in enumerate(zip(at, inwards)):  # Moeller and Trumbore 1997
+        side = numpy.cross(ray, c - a)
+        size = numpy.einsum("tx,tx->t", b - a, side)
+        size = numpy.where(numpy.abs(size) < 1e-30, 1e-30, size)
+        from_a = origin - a
+        u = numpy.einsum("tx,tx->t", from_a, side) / size
+        across = numpy.cross(from_a, b - a)
+        v = across @ ray / size
+        way = numpy.einsum("tx,tx->t", c - a, across) / size
+        hit = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (way > 1e-6)
+        result[number] = way[hit].min(initial=numpy.inf)
+    return result
+
+
+def make_map(job, mesh, cuts, most_m, side="all", wall_m=None):
+    """Local cuts, evenly spread over one side of a mesh, at most most_m deep; each fades to its neighbours. side: outer or inner surfaces
+    look away from the middle of the body, or towards it."""
+    nodes, tets = numpy.array(mesh.nodes), numpy.array(mesh.tets)
+    triangles = grid.find_surface(tets)
+    normal, area = find_normals(nodes, triangles)
+    surface = numpy.unique(triangles)
+    looks = numpy.einsum("nx,nx->n", normal, nodes - (nodes.min(axis=0) + nodes.max(axis=0)) / 2)
+    allowed = surface if side == "all" else surface[(looks[surface] > 0) == (side == "outer")]
+    if side not in ("all", "outer", "inner") or not len(allowed):
+        raise InputError(f"--remove {side}: outer, inner or all")
+    chosen = [allowed[0]]
+    away = numpy.linalg.norm(nodes[allowed] - nodes[chosen[0]], axis=1)
+    for _ in range(min(cuts, len(allowed)) - 1):
+        chosen.append(allowed[away.argmax()])
+        away = numpy.minimum(away, numpy.linalg.norm(nodes[allowed] - nodes[chosen[-1]], axis=1))
+    chosen = numpy.array(chosen)
+    radius = 2 * away.max()
+    share = numpy.linalg.norm(nodes[surface] - nodes[chosen][:, None], axis=2) / radius
+    depth = numpy.where((share < 1) & (normal[chosen] @ normal[surface].T > 0.5), (1 - share**2) ** 2, 0)
+    depth[:, ~numpy.isin(surface, allowed)] = 0
+    depth /= depth.sum(axis=0).max()
+    walls = find_wall(nodes, triangles, nodes[chosen], -normal[chosen])
+    left = numpy.where(numpy.isfinite(walls), walls, 0)
+    high = numpy.clip(left - (left / 4 if wall_m is None else wall_m), 0, most_m)
+    moves = -depth[:, :, None] * normal[surface]
+    fields = grid.spread(nodes, tets, surface, moves.transpose(1, 0, 2).reshape(len(surface), -1))
+    fields = fields.reshape(len(nodes), len(chosen), 3).transpose(1, 0, 2)
+    names = ["({:.1f}, {:.1f}, {:.1f}) mm".format(*(1e3 * nodes[c])) for c in chosen]
+    marks = depth[:, numpy.searchsorted(surface, chosen)].T
+    step = numpy.maximum(high, 1e-9)
+    return Moved(job, nodes, tets, fields, names, numpy.zeros(len(chosen)), high, step, marks, mesh=mesh, volumes=depth @ area[surface])
+
+
+class Keys:
+    """Keys of a job, like body.wall_m, within limits; the body is meshed again for each value. fineness scales body.nodes with its square.
+    Derivatives: difference quotients at first, then secants (Broyden 1965), which the noise between meshes disturbs less."""
+
+    smooth, floor, ceiling = False, "its least value is reached", "its largest value is reached"
+
+    def __init__(self, job, limits, fineness, search, before=None):
+        self.job, self.names, self.search = job, list(limits), search
+        self.low, self.high = numpy.array(list(limits.values())).T
+        self.step = (self.high - self.low) / 4
+        self.marks = numpy.eye(len(self.names))
+        self.fineness = fineness
+        self.jacobian = before.jacobian if before else None
+        self.last = None  # (p, cents) of the jacobian
+        self.is_fresh = False  # of difference quotients at this p
+        self.is_length = numpy.array([name.endswith("_m") for name in self.names])
+
+    def refresh(self):
+        """Whether new difference quotients may help where a step failed."""
+        if not self.is_fresh:
+            self.jacobian = self.last = None
+        return not self.is_fresh
+
+    def get_surfaces(self, first, last):
+        return tuple((state.solution.vertices, state.solution.triangles) for state in (first, last))
+
+    def make_job(self, values, _folder):
+        job = json.loads(json.dumps(self.job))
+        job.pop("accuracy_cents", None)
+        for name, value in zip(self.names, values):
+            *path, key = name.split(".")
+            at = job
+            for word in path:
+                at = at[word]
+            at[key] = float(value)
+        if "body" in job and "edge_m" not in job["body"]:
+            job["body"]["nodes"] = int(job["body"].get("nodes", KEY_NODES) * (self.fineness / 2) ** 2)
+        return job
+
+    def calc_jacobian(self, state):
+        """(groups, K) cents per unit of each key at a State."""
+        if self.last is not None and numpy.array_equal(self.last[0], state.p):
+            return self.jacobian
+        if self.jacobian is None:
+            columns = []
+            for k in range(len(self.names)):
+                step = KEY_STEP * abs(state.p[k]) or self.step[k] / 10
+                step = -step if state.p[k] + step > self.high[k] else step
+                p = state.p.copy()
+                p[k] += step
+                columns.append((self.search.visit(self, p, state).off_cents - state.off_cents) / step)
+            self.jacobian, self.is_fresh = numpy.array(columns).T, True
+        elif self.last is not None:
+            way = (state.p - self.last[0]) / self.step
+            missed = state.off_cents - self.last[1] - self.jacobian @ (state.p - self.last[0])
+            self.jacobian, self.is_fresh = self.jacobian + numpy.outer(missed, way / self.step) / (way @ way), False
+        self.last = (state.p, state.off_cents)
+        return self.jacobian
+
+
+def read_limits(text, job):
+    """{key: (low, high)} of 'body.wall_m=0.002:0.004,...' InputError."""
+    limits = {}
+    for word in text.split(","):
+        name, _, values = word.partition("=")
+        at = job
+        for part in name.strip().split("."):
+            at = at.get(part) if isinstance(at, dict) else None
+        try:
+            low, high = (float(value) for value in values.split(":"))
+        except ValueError:
+            raise InputError(f"--free {word!r}: give a key and its limits, like body.wall_m=0.002:0.004") from None
+        if isinstance(at, bool) or not isinstance(at, (int, float)):
+            raise InputError(f"--free {name.strip()}: the job has no such number")
+        if not low <= at <= high or low == high:
+            raise InputError(f"--free {word}: the value of the job, {at:g}, is not within the limits")
+        limits[name.strip()] = (low, high)
+    return limits
+
+
+def get_values(job, names):
+    values = []
+    for name in names:
+        at = job
+        for part in name.split("."):
+            at = at[part]
+        values.append(float(at))
+    return numpy.array(values)

@@ -1,0 +1,198 @@
+"""carillon tune: removes material, or changes keys of a job, until a body has the wished frequencies."""
+import json
+import pathlib
+import shutil
+import tempfile
+import time
+
+import numpy
+
+import drawing
+import grid
+import measuring
+import programs
+import shapes
+import steps
+import targets
+from errors import InputError
+from solver import Solver
+
+NOT_REACHED = 5  # exit code
+
+
+def add_command(commands):
+    parser = commands.add_parser(
+        "tune",
+        help="material removed, or keys of a job changed, until modes have the wished frequencies",
+        description="Tunes the body of a job: a bar by an undercut, any body by a removal map or by keys of its job, a bell by its outline. "
+        "Writes the new job, meshes of the body and of the cut, a drawing in mm, the bank and a table. Exit code 5: not reached; the table "
+        "says which mode and bound are in the way, and the files are the best that was found.",
+    )
+    parser.set_defaults(run=run)
+    add = parser.add_argument
+    add("job", metavar="JOB.json", help="a job of carillon-precompute")
+    add("-o", "--out", metavar="FOLDER", default="tuned", help="output folder (default: tuned)")
+    add("--partials", metavar="1,4,10", help="ratios to the fundamental; with weights 1,4,10:0.5")
+    add("--fundamental", metavar="HZ|NOTE", help="frequency of ratio 1, like 220 or A3 (A4 is 440 Hz)")
+    add("--hz", metavar="HZ|NOTE,...", help="frequencies or notes, like 2637,E8:0.5")
+    add("--bell", choices=sorted(targets.BELLS), help="five partials of a church bell around the prime, the fundamental")
+    add("--modes", metavar="KIND N,...", help='the modes of these frequencies: "bending 1,torsion 1", "n=2", "mode 3" (default: of a bar that '
+        "is undercut bending 1, bending 2, ..., else the nearest)")  # fmt: skip
+    add(
+        "--apart", metavar="KIND:CENTS", action="append", default=[], help="modes of this kind stay so far from every wish, like torsion:50"
+    )
+    add("--close-pairs", metavar="N,...", help="close the beats of these pairs of modes, 1 is the lowest, by local cuts of least volume")
+    add("--keep", metavar="N,...", help="with --close-pairs: modes whose frequencies stay")
+    add("--free", metavar="KEY=LOW:HIGH,...", help="keys of the job to change within these values, like body.wall_m=0.002:0.004")
+    add("--map", action="store_true", help="a removal map: local cuts anywhere on the surface")
+    add(
+        "--remove",
+        default="",
+        metavar="SIDE",
+        help="where material goes: z-min (default) or z-max of a bar; outer, inner or all (default) of a map",
+    )
+    add("--wall", metavar="LENGTH", help="least wall left, like 3mm (default: a quarter of the thickness)")
+    add("--most", metavar="LENGTH", default="0.5mm", help="deepest local cut (default: 0.5mm)")
+    add("--knots", type=int, metavar="N", help="depths along half of a bar (default: 6); of a map: cuts (default: 42)")
+    add("--cents", type=float, default=0.2, help="largest distance from a wish (default: 0.2)")
+    add("--tolerance", metavar="LENGTH", default="0.02mm", help="of the milling, for the guarantee (default: 0.02mm)")
+    add("--bin", metavar="FOLDER", help="folder of carillon-precompute (default: next to this program)")
+    add("--json", action="store_true", help="print the result as one JSON document")
+
+
+def read_job(path):
+    try:
+        job = json.loads(pathlib.Path(path).read_text())
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from None
+    except ValueError as error:
+        raise InputError(f"{path}: not JSON: {error}") from None
+    if not isinstance(job, dict):
+        raise InputError(f"{path}: a job is a JSON object")
+    return job
+
+
+def run(options):
+    """(text, document) of the command."""
+    start = time.process_time()
+    if not 0.001 <= options.cents <= 100:
+        raise InputError("--cents: between 0.001 and 100")
+    if options.knots is not None and not 1 <= options.knots <= 400:
+        raise InputError("--knots: between 1 and 400")
+    job = read_job(options.job)
+    wall = shapes.read_length(options.wall) if options.wall else None
+    tolerance = shapes.read_length(options.tolerance)
+    say = (lambda text: None) if options.json else (lambda text: print(text, flush=True))
+    solver = Solver(programs.find_program(options.bin), options.job)
+    folder = tempfile.TemporaryDirectory(prefix="carillon-tune-")
+    out = pathlib.Path(options.out)
+    out.mkdir(parents=True, exist_ok=True)
+    with folder:
+        aparts = [targets.read_apart(text) for text in options.apart]
+        search = steps.Search(solver, [], aparts, options.cents, pathlib.Path(folder.name), say)
+        if options.close_pairs or options.map:
+            mesher = programs.find_program(options.bin, "carillon-mesh")
+            mesh = shapes.read_mesh(job, options.job, folder.name, mesher)
+            body = shapes.make_map(job, mesh, options.knots or 42, shapes.read_length(options.most), options.remove or "all", wall)
+            make_body, start_p = lambda fineness: body, numpy.zeros(len(body.names))
+        elif options.free:
+            if aparts:
+                raise InputError("--apart needs sensitivities to cuts: leave it out with --free")
+            limits = shapes.read_limits(options.free, job)
+            before = []
+            make_body = lambda fineness: before.append(shapes.Keys(job, limits, fineness, search, *before[-1:])) or before[-1]
+            start_p = shapes.get_values(job, limits)
+        else:
+            knots = options.knots or 6
+            make_body = lambda fineness: shapes.make_undercut(job, fineness, knots, options.remove or "z-min", wall)
+            start_p = numpy.zeros(knots)
+        if options.close_pairs:
+            outcome = search.close(body, read_counts(options.close_pairs), read_counts(options.keep))
+        else:
+            search.set_wishes(targets.read_wishes(options, "" if options.map or options.free else "bending"))
+            outcome = search.tune(make_body, start_p)
+        return report(options, outcome, search.wishes, tolerance, solver, out, start)
+
+
+def read_counts(text):
+    """[int] of numbers from 1; InputError."""
+    try:
+        numbers = [int(word) for word in text.split(",")] if text else []
+    except ValueError:
+        numbers = [0]
+    if min(numbers, default=1) < 1 or len(set(numbers)) != len(numbers):
+        raise InputError(f"{text!r}: give different numbers from 1, like 1,2")
+    return numbers
+
+
+def report(options, outcome, wishes, tolerance, solver, out, start):
+    last, body = outcome.last, outcome.body
+    milling = numpy.abs(outcome.jacobian[:, body.is_length]).sum(axis=1) * tolerance
+    names = [wish.mode for wish in wishes] or [f"pair at {hz:.1f} Hz" for hz in last.hz]
+    sure = numpy.abs(last.off_cents) + milling + (last.bars if wishes else 0)
+    columns = {
+        "before_hz": outcome.first.hz,
+        "wish_hz": numpy.array([wish.hz for wish in wishes] or last.hz),
+        "after_hz": last.hz,
+        "off_before_cents": outcome.first.off_cents,
+        "off_cents": last.off_cents,
+        "bar_cents": last.bars,
+        "milling_cents": milling,
+        "guarantee_cents": sure,
+    }
+    modes = [{"mode": name or last.solution.kinds[last.groups[k][0]]} for k, name in enumerate(names)]
+    for k, mode in enumerate(modes):
+        mode |= {key: float(values[k]) for key, values in columns.items()} | {"cents_per_unit": outcome.jacobian[k].tolist()}
+    rows = [["mode", "before Hz", "wish Hz", "after Hz", "off before", "off", "bar", "milling", "guarantee"]]
+    rows += [[mode["mode"], *(f"{mode[key]:{'+' if 'off' in key else ''}.2f}" for key in columns)] for mode in modes]
+    units = numpy.where(body.is_length, 1e-4, 0.01 * numpy.abs(last.p))
+    depths = [["parameter", "value", *(f"cents, {mode['mode']}" for mode in modes)]]
+    for k, (name, value) in enumerate(zip(body.names, body.marks @ last.p)):
+        if value > 1e-6 or body.smooth:
+            shown = f"{1e3 * value:.3f} mm" if body.is_length[k] else f"{value:.6g}"
+            depths.append([name, shown, *(f"{units[k] * row[k]:+.2f}" for row in outcome.jacobian)])
+    table = measuring.format_table(rows)
+    cpu_s = solver.cpu_s + time.process_time() - start
+    text = [
+        table,
+        "off, bar, milling, guarantee in cents: from the wish (of pairs: beats); of the body's true frequency; for +-"
+        f"{1e3 * tolerance:g} mm everywhere; the sum of the three",
+        "",
+        measuring.format_table(depths),
+        "cents: for 0.1 mm more" + ("" if body.is_length.all() else ", of other values 1 %"),
+        f"{solver.solves} solves, {cpu_s:.1f} CPU s",
+    ]
+    if not outcome.reached:
+        text.append(f"not reached: {outcome.obstacle}")
+    lines = table.splitlines()
+    write_files(out, outcome, options, [lines[0], *lines[2:]])
+    (out / "table.txt").write_text("\n".join(text) + "\n")
+    document = {
+        "exit_code": 0 if outcome.reached else NOT_REACHED,
+        "modes": modes,
+        "parameters": dict(zip(body.names, last.p.tolist())),
+        "obstacle": outcome.obstacle,
+        "solves": solver.solves,
+        "cpu_seconds": cpu_s,
+        "steps": [{"mesh": mesh, "off_cents": off, "parameters": p} for mesh, off, p in outcome.steps],
+    }
+    (out / "tune.json").write_text(json.dumps(document, indent=1) + "\n")
+    text.append(", ".join(str(path) for path in sorted(out.iterdir())))
+    return "\n".join(text), document
+
+
+def write_files(out, outcome, options, table):
+    """Job, mesh, surfaces, drawing and bank of the last design."""
+    body, p = outcome.body, outcome.last.p
+    job = body.make_job(p, out) | {"bank": "again.hdf"}
+    if "mesh" in job:
+        job["mesh"] = "body.msh" if (out / "body.msh").exists() else job["mesh"]
+    (out / "job.json").write_text(json.dumps(job, indent=1) + "\n")
+    for ending in ("", ".resolved.json"):
+        shutil.copyfile(f"{outcome.last.bank}{ending}", out / f"bank.hdf{ending}")
+    before, after = body.get_surfaces(outcome.first, outcome.last)
+    grid.write_stl(out / "body.stl", *after)
+    grid.write_obj(out / "body.obj", *after)
+    if before[1] is after[1]:
+        grid.write_stl(out / "cut.stl", *grid.find_cut(before[0], *after))
+    drawing.draw(out / "drawing.svg", before, after, f"{pathlib.Path(options.job).stem}, tuned", table)
