@@ -19,9 +19,8 @@ from errors import InputError
 EDGES_ALONG = 24  # elements along a bar on the coarse mesh
 END_SHARE = 0.46  # of the length: the cut ends there
 MAX_SHARE = 0.3  # largest step, of the depth that may go
-AWAY_COS = 0.3  # of normals: the other side of a wall
 KEY_NODES = 16000  # of a body without a number of nodes, on the fine mesh
-KEY_STEP = 0.05  # difference quotient of a job key, of its value
+KEY_STEP = 0.03  # of the value of a key: half the difference of two meshes
 
 
 def read_length(text):
@@ -64,10 +63,6 @@ class Moved:
     def is_length(self):
         return numpy.ones(len(self.names), bool)
 
-    def refresh(self):
-        """Whether new derivatives may help where a step failed: these are exact to first order."""
-        return False
-
     def get_surfaces(self, _first, last):
         """((positions, triangles) before, after) of two States."""
         triangles = grid.find_surface(self.tets)
@@ -83,20 +78,26 @@ class Moved:
         dropped = ("body", "accuracy_cents", "shape", "mesh_scale")
         return {key: value for key, value in self.job.items() if key not in dropped} | {"mesh": str(path.resolve())}
 
-    def calc_entries(self, solution, depths_m):
-        """(C, K) cents per m of each parameter for the columns of solution.sites."""
+    def calc_velocities(self, solution, depths_m):
+        """(K, S) outward motion of the sites of a Solution for each parameter."""
         sites = solution.sites
         apart, node = scipy.spatial.cKDTree(self.place(depths_m)).query(solution.vertices[sites.vertex])
         if apart.max() > 1e-6 * numpy.ptp(self.nodes, axis=0).max():
             raise InputError("the bank has vertices that the mesh has not")
-        inwards = -numpy.einsum("ksx,sx->ks", self.fields[:, node], sites.normal)
-        return 1e3 * ((inwards * sites.area_m2) @ sites.density).T
+        return numpy.einsum("ksx,sx->ks", self.fields[:, node], sites.normal)
 
-    def calc_jacobian(self, state, groups=None):
-        """(groups, K) cents per m at a State: the mean of the modes of each group, which off-diagonal entries do not change."""
-        entries = self.calc_entries(state.solution, state.p)
-        of = {int(i): c for c, (i, j) in enumerate(state.solution.sites.columns) if i == j}
-        return numpy.array([numpy.mean([entries[of[m]] for m in group], axis=0) for group in groups or state.groups])
+
+def calc_entries(body, state):
+    """(C, K) cents for each unit of a parameter, for the columns of the sensitivities of a State."""
+    sites = state.solution.sites
+    return -1e3 * ((body.calc_velocities(state.solution, state.p) * sites.area_m2) @ sites.density).T
+
+
+def calc_jacobian(body, state, groups):
+    """(groups, K) cents for each unit of a parameter: the mean of the modes of each group, which off-diagonal entries do not change."""
+    entries = calc_entries(body, state)
+    of = {int(i): c for c, (i, j) in enumerate(state.solution.sites.columns) if i == j}
+    return numpy.array([numpy.mean([entries[of[m]] for m in group], axis=0) for group in groups])
 
 
 def find_bases(knots, spacing, along):
@@ -228,63 +229,57 @@ def make_map(job, mesh, cuts, most_m, side="all", wall_m=None):
 
 
 class Keys:
-    """Keys of a job, like body.wall_m, within limits; the body is meshed again for each value. fineness scales body.nodes with its square.
-    Derivatives: difference quotients at first, then secants (Broyden 1965), which the noise between meshes disturbs less."""
+    """Keys of a job's body, like body.wall_m, within limits; the body is meshed again for each value. fineness scales body.nodes with its
+    square. The motion of the surface is the difference of two meshes, of a larger and a smaller value; nothing is solved for it."""
 
     smooth, floor, ceiling = False, "its least value is reached", "its largest value is reached"
 
-    def __init__(self, job, limits, fineness, search, before=None):
-        self.job, self.names, self.search = job, list(limits), search
+    def __init__(self, job, limits, fineness, mesh):
+        """mesh: function of a job to its MeshFile."""
+        self.job, self.names, self.mesh, self.fineness = job, list(limits), mesh, fineness
         self.low, self.high = numpy.array(list(limits.values())).T
-        self.step = (self.high - self.low) / 4
+        self.step = (self.high - self.low) / 8
         self.marks = numpy.eye(len(self.names))
-        self.fineness = fineness
-        self.jacobian = before.jacobian if before else None
-        self.last = None  # (p, cents) of the jacobian
-        self.is_fresh = False  # of difference quotients at this p
         self.is_length = numpy.array([name.endswith("_m") for name in self.names])
-
-    def refresh(self):
-        """Whether new difference quotients may help where a step failed."""
-        if not self.is_fresh:
-            self.jacobian = self.last = None
-        return not self.is_fresh
 
     def get_surfaces(self, first, last):
         return tuple((state.solution.vertices, state.solution.triangles) for state in (first, last))
 
-    def make_job(self, values, _folder):
-        job = json.loads(json.dumps(self.job))
-        job.pop("accuracy_cents", None)
-        for name, value in zip(self.names, values):
-            *path, key = name.split(".")
-            at = job
-            for word in path:
-                at = at[word]
-            at[key] = float(value)
-        if "body" in job and "edge_m" not in job["body"]:
+    def make_job(self, values, _folder=None):
+        job = {key: value for key, value in self.job.items() if key != "accuracy_cents"}
+        job["body"] = job["body"] | {name.removeprefix("body."): float(value) for name, value in zip(self.names, values)}
+        if "edge_m" not in job["body"]:
             job["body"]["nodes"] = int(job["body"].get("nodes", KEY_NODES) * (self.fineness / 2) ** 2)
         return job
 
-    def calc_jacobian(self, state):
-        """(groups, K) cents per unit of each key at a State."""
-        if self.last is not None and numpy.array_equal(self.last[0], state.p):
-            return self.jacobian
-        if self.jacobian is None:
-            columns = []
-            for k in range(len(self.names)):
-                step = KEY_STEP * abs(state.p[k]) or self.step[k] / 10
-                step = -step if state.p[k] + step > self.high[k] else step
-                p = state.p.copy()
-                p[k] += step
-                columns.append((self.search.visit(self, p, state).off_cents - state.off_cents) / step)
-            self.jacobian, self.is_fresh = numpy.array(columns).T, True
-        elif self.last is not None:
-            way = (state.p - self.last[0]) / self.step
-            missed = state.off_cents - self.last[1] - self.jacobian @ (state.p - self.last[0])
-            self.jacobian, self.is_fresh = self.jacobian + numpy.outer(missed, way / self.step) / (way @ way), False
-        self.last = (state.p, state.off_cents)
-        return self.jacobian
+    def calc_velocities(self, solution, values):
+        """As Moved.calc_velocities()."""
+        points, normal = solution.vertices[solution.sites.vertex], solution.sites.normal
+        rows = []
+        for k in range(len(values)):
+            ends = [
+                numpy.clip(values[k] + sign * KEY_STEP * (abs(values[k]) or self.step[k]), self.low[k], self.high[k]) for sign in (1, -1)
+            ]
+            ways = []
+            for end in ends:
+                mesh = self.mesh(self.make_job([*values[:k], end, *values[k + 1 :]]))
+                ways.append(find_way(points, normal, numpy.array(mesh.nodes), grid.find_surface(numpy.array(mesh.tets))))
+            rows.append((ways[0] - ways[1]) / (ends[0] - ends[1]))
+        return numpy.array(rows)
+
+
+def find_way(points, normal, nodes, triangles):
+    """(S) distances along the normals from points of one surface to another, near and of about the same direction. The chord between two
+    points of a sphere is at right angles to the sum of their normals, so the place of the nearest triangle hardly matters."""
+    corners = nodes[triangles]
+    other = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    other /= numpy.maximum(numpy.linalg.norm(other, axis=1, keepdims=True), 1e-30)
+    centre = corners.mean(axis=1)
+    size = numpy.ptp(nodes, axis=0).max()  # sides of an edge are far apart in the six numbers compared
+    tree = scipy.spatial.cKDTree(numpy.concatenate([centre, size * other], axis=1))
+    chosen = tree.query(numpy.concatenate([points, size * normal], axis=1))[1]
+    mean = normal + other[chosen]
+    return numpy.einsum("sx,sx->s", centre[chosen] - points, mean) / numpy.einsum("sx,sx->s", normal, mean)
 
 
 def read_limits(text, job):
@@ -292,26 +287,15 @@ def read_limits(text, job):
     limits = {}
     for word in text.split(","):
         name, _, values = word.partition("=")
-        at = job
-        for part in name.strip().split("."):
-            at = at.get(part) if isinstance(at, dict) else None
+        name = name.strip()
+        at = job.get("body", {}).get(name.removeprefix("body.")) if name.startswith("body.") else None
         try:
             low, high = (float(value) for value in values.split(":"))
         except ValueError:
             raise InputError(f"--free {word!r}: give a key and its limits, like body.wall_m=0.002:0.004") from None
         if isinstance(at, bool) or not isinstance(at, (int, float)):
-            raise InputError(f"--free {name.strip()}: the job has no such number")
+            raise InputError(f"--free {name}: the job has no such size of a body, like body.wall_m")
         if not low <= at <= high or low == high:
             raise InputError(f"--free {word}: the value of the job, {at:g}, is not within the limits")
-        limits[name.strip()] = (low, high)
+        limits[name] = (low, high)
     return limits
-
-
-def get_values(job, names):
-    values = []
-    for name in names:
-        at = job
-        for part in name.split("."):
-            at = at[part]
-        values.append(float(at))
-    return numpy.array(values)

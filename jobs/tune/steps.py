@@ -8,14 +8,15 @@ import dataclasses
 import numpy
 import scipy.optimize
 
+import shapes
 import solver
 import targets
 
-FAR_CENTS = 400.0  # larger residuals count as this: first order is not valid so far
+FAR_CENTS = 400.0  # of the largest residual that a step is to take away: first order is not valid further
 COARSE_CENTS = 3.0  # left on the coarse mesh
 MIN_SHAPE = 0.6  # MAC of a followed mode
 MAX_STEPS, MIN_SHARE = 14, 0.1
-SLOW = 0.95  # of the residual left by a step; two such steps end a search
+SLOW, MEMORY = 0.95, 2  # a search ends when twice so many steps leave more than this of the residual
 FINE = 2.0  # elements of the fine mesh along an edge, of the coarse
 SPARE_MODES = 6  # above the highest wish: modes that may come down
 SMOOTH, DAMPING = 0.02, 0.01  # weights of jumps and of the step, of the largest derivative
@@ -130,7 +131,7 @@ class Search:
                     gap = 1200 * numpy.log2(state.solution.corrected_hz[group[0]] / state.solution.corrected_hz[wished[0]])
                     if set(group) & set(wished) or abs(gap) >= apart.cents:
                         continue
-                    both = body.calc_jacobian(state, [group, wished])
+                    both = shapes.calc_jacobian(body, state, [group, wished])
                     rows.append(both[0] - both[1])
                     residual.append((1 if gap > 0 else -1) * CLEAR * apart.cents - gap)
                     gaps.append(apart.cents - abs(gap))
@@ -143,7 +144,7 @@ class Search:
 
     def find_step(self, body, state):
         """The step (K), and the system (A, y) in units of body.step that it solves."""
-        jacobian = body.calc_jacobian(state)
+        jacobian = shapes.calc_jacobian(body, state, state.groups)
         rows, residual, _ = self.find_apart(body, state)
         a = numpy.concatenate([self.weights[:, None] * jacobian, *([row] for row in rows)]) * body.step
         y = numpy.concatenate([-self.weights * state.off_cents, residual])
@@ -158,7 +159,7 @@ class Search:
         low = numpy.maximum(body.low - state.p, -body.step) / body.step
         high = numpy.minimum(body.high - state.p, body.step) / body.step
         found = scipy.optimize.lsq_linear(
-            numpy.concatenate([a, *extra]), numpy.concatenate([numpy.clip(y, -FAR_CENTS, FAR_CENTS), *right]), (low - 1e-9, high + 1e-9)
+            numpy.concatenate([a, *extra]), numpy.concatenate([y * min(1.0, FAR_CENTS / numpy.abs(y).max()), *right]), (low - 1e-9, high + 1e-9)
         )
         return numpy.clip(found.x, low, high) * body.step
 
@@ -170,15 +171,15 @@ class Search:
         after.mac = least
         return after
 
-    def advance(self, body, state):
-        """The next State, or None where no part of the step reduces the residual."""
-        step, before, share = self.find_step(body, state), self.measure(body, state), 1.0
+    def advance(self, body, state, limit):
+        """The next State, or None where no part of the step comes below the limit."""
+        step, share = self.find_step(body, state), 1.0
         while share >= MIN_SHARE:
             p = state.p + share * step
             if numpy.abs(p - state.p).max() < 1e-9:
                 return None
             after = self.visit(body, p, state)
-            if after.mac > MIN_SHAPE and self.measure(body, after) < before:
+            if after.mac > MIN_SHAPE and self.measure(body, after) < limit:
                 return after
             share /= 2
         return None
@@ -188,19 +189,20 @@ class Search:
 
     def descend(self, body, state, cents, name):
         """The best State of a mesh: within cents, or where no step helps."""
-        slow = 0
+        best, left = state, [self.measure(body, state)]
         for _ in range(MAX_STEPS):
             self.note(name, body, state)
             if self.is_reached(body, state, cents):
                 return state
-            after = self.advance(body, state)
-            slow = slow + 1 if after is None or self.measure(body, after) > SLOW * self.measure(body, state) else 0
-            if after is None or slow == 2:
-                if not body.refresh():
-                    return after or state
-                slow = 0
-            state = after or state
-        return state
+            # Along curved valleys a step may lose a little before the next one gains (Grippo, Lampariello and Lucidi 1986).
+            state = self.advance(body, state, max(left[-MEMORY:]))
+            if state is None:
+                return best
+            left.append(self.measure(body, state))
+            best = state if left[-1] <= min(left) else best
+            if len(left) > 2 * MEMORY and min(left[-2 * MEMORY :]) > SLOW * min(left[: -2 * MEMORY]):
+                return best
+        return best
 
     def note(self, name, body, state):
         self.steps.append((name, state.off_cents.tolist(), state.p.tolist()))
@@ -216,7 +218,7 @@ class Search:
             body = make_body(FINE)
             state = self.descend(body, self.visit(body, state.p, state), self.cents, "fine")
         reached = self.is_reached(body, state, self.cents)
-        jacobian = body.calc_jacobian(state)
+        jacobian = shapes.calc_jacobian(body, state, state.groups)
         obstacle = "" if reached else self.find_obstacle(body, state, jacobian)
         return Outcome(first, state, body, jacobian, reached, obstacle, self.steps)
 
@@ -256,7 +258,7 @@ class Search:
 
     def find_splits(self, body, state):
         """Derivatives (pairs, K) of the splits, and of the off-diagonal entries [cents per m]; None for those a bank has not."""
-        entries = body.calc_entries(state.solution, state.p)
+        entries = shapes.calc_entries(body, state)
         of = {frozenset(map(int, pair)): column for column, pair in enumerate(state.solution.sites.columns)}
         splits = numpy.array([entries[of[frozenset([j])]] - entries[of[frozenset([i])]] for i, j in state.groups])
         return splits, [entries[of[frozenset(pair)]] if frozenset(pair) in of else None for pair in state.groups], entries, of

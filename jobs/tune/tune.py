@@ -90,18 +90,16 @@ def run(options):
     with folder:
         aparts = [targets.read_apart(text) for text in options.apart]
         search = steps.Search(solver, [], aparts, options.cents, pathlib.Path(folder.name), say)
+        mesher = programs.find_program(options.bin, "carillon-mesh")
         if options.close_pairs or options.map:
-            mesher = programs.find_program(options.bin, "carillon-mesh")
             mesh = shapes.read_mesh(job, options.job, folder.name, mesher)
             body = shapes.make_map(job, mesh, options.knots or 42, shapes.read_length(options.most), options.remove or "all", wall)
             make_body, start_p = lambda fineness: body, numpy.zeros(len(body.names))
         elif options.free:
-            if aparts:
-                raise InputError("--apart needs sensitivities to cuts: leave it out with --free")
             limits = shapes.read_limits(options.free, job)
-            before = []
-            make_body = lambda fineness: before.append(shapes.Keys(job, limits, fineness, search, *before[-1:])) or before[-1]
-            start_p = shapes.get_values(job, limits)
+            make_mesh = lambda changed: shapes.read_mesh(changed, options.job, folder.name, mesher)
+            make_body = lambda fineness: shapes.Keys(job, limits, fineness, make_mesh)
+            start_p = numpy.array([job["body"][name.removeprefix("body.")] for name in limits])
         else:
             knots = options.knots or 6
             make_body = lambda fineness: shapes.make_undercut(job, fineness, knots, options.remove or "z-min", wall)
