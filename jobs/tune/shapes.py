@@ -9,6 +9,7 @@ import pathlib
 import re
 
 import numpy
+import scipy.interpolate
 import scipy.spatial
 
 import grid
@@ -19,8 +20,9 @@ from errors import InputError
 EDGES_ALONG = 24  # elements along a bar on the coarse mesh
 END_SHARE = 0.46  # of the length: the cut ends there
 MAX_SHARE = 0.3  # largest step, of the depth that may go
+LATHE_CELLS = 20  # elements along an outline on the coarse mesh
 KEY_NODES = 16000  # of a body without a number of nodes, on the fine mesh
-KEY_STEP = 0.03  # of the value of a key: half the difference of two meshes
+KEY_STEPS = (0.03, 0.3)  # of the logarithm of a key: half the difference of two meshes; largest in a search
 
 
 def read_length(text):
@@ -51,6 +53,7 @@ class Moved:
     step: numpy.ndarray
     marks: numpy.ndarray  # (K, K) parameters to depths at the places of the names
     smooth: bool = False
+    is_remeshed = False  # derivatives are exact to first order
     mesh: object = None  # the MeshFile whose node sets stay
     volumes: numpy.ndarray | None = None  # (K) m^2, of material for each m of depth
     floor: str = "no material can be added there"
@@ -62,6 +65,10 @@ class Moved:
     @property
     def is_length(self):
         return numpy.ones(len(self.names), bool)
+
+    def show(self, p):
+        """Depths at the places of the names, and what they change for each unit of p."""
+        return self.marks @ p, numpy.ones(len(p))
 
     def get_surfaces(self, _first, last):
         """((positions, triangles) before, after) of two States."""
@@ -100,16 +107,11 @@ def calc_jacobian(body, state, groups):
     return numpy.array([numpy.mean([entries[of[m]] for m in group], axis=0) for group in groups])
 
 
-def find_bases(knots, spacing, along):
-    """(knots, ...) cubic B-splines centred at k * spacing, mirrored at 0. They are positive with the sum 1 or less: where all coefficients
-    lie between two bounds, the depth does too."""
-
-    def spline(u):
-        u = numpy.abs(u)
-        return numpy.where(u < 1, 2 / 3 - u**2 + u**3 / 2, numpy.where(u < 2, (2 - numpy.minimum(u, 2)) ** 3 / 6, 0))
-
-    at = numpy.abs(along) / spacing
-    return numpy.array([spline(at - k) + (spline(at + k) if k else 0) for k in range(knots)])
+def find_splines(knots, spacing, along):
+    """(knots, ...) cubic B-splines centred at k * spacing. They are positive with the sum 1 or less: where all coefficients lie between two
+    bounds, the depth does too."""
+    u = numpy.abs(along / spacing - numpy.arange(knots).reshape(-1, *(1 for _ in numpy.shape(along))))
+    return numpy.where(u < 1, 2 / 3 - u**2 + u**3 / 2, (2 - numpy.minimum(u, 2)) ** 3 / 6)
 
 
 def make_undercut(job, fineness, knots=6, side="z-min", wall_m=None):
@@ -137,13 +139,19 @@ def make_undercut(job, fineness, knots=6, side="z-min", wall_m=None):
     nodes = places * [length, width, thickness]
     spacing = END_SHARE * length / (knots + 1)
     up = 1 if side == "z-min" else -1
-    bases = find_bases(knots, spacing, nodes[:, 0])
+
+    def find_bases(x):
+        """Mirrored at the middle."""
+        right, left = find_splines(knots, spacing, x), find_splines(knots, spacing, -x)
+        return right + numpy.where(numpy.arange(knots)[:, None] > 0, left, 0)
+
+    bases = find_bases(nodes[:, 0])
     fields = numpy.zeros((knots, len(nodes), 3))
     fields[:, :, 2] = up * bases * (0.5 - up * places[:, 2])
     top = numpy.full(knots, thickness - wall)
     at = numpy.arange(knots) * spacing
     names = [f"{1e3 * x:.1f} mm from the middle" for x in at]
-    marks = find_bases(knots, spacing, at).T
+    marks = find_bases(at).T
     return Moved(job, nodes, tets, fields, names, numpy.zeros(knots), top, MAX_SHARE * top, marks, smooth=True)
 
 
@@ -229,42 +237,44 @@ def make_map(job, mesh, cuts, most_m, side="all", wall_m=None):
 
 
 class Keys:
-    """Keys of a job's body, like body.wall_m, within limits; the body is meshed again for each value. fineness scales body.nodes with its
-    square. The motion of the surface is the difference of two meshes, of a larger and a smaller value; nothing is solved for it."""
+    """Keys of a job's body, like body.wall_m, within limits; parameters are logarithms of their values, in which frequencies are nearly
+    linear. The body is meshed again for each value; fineness scales body.nodes with its square. The motion of the surface is the difference
+    of two meshes, of a larger and a smaller value; nothing is solved for it."""
 
-    smooth, floor, ceiling = False, "its least value is reached", "its largest value is reached"
+    smooth, is_remeshed, floor, ceiling = False, True, "its least value is reached", "its largest value is reached"
 
     def __init__(self, job, limits, fineness, mesh):
         """mesh: function of a job to its MeshFile."""
         self.job, self.names, self.mesh, self.fineness = job, list(limits), mesh, fineness
-        self.low, self.high = numpy.array(list(limits.values())).T
-        self.step = (self.high - self.low) / 8
-        self.marks = numpy.eye(len(self.names))
+        self.low, self.high = numpy.log(numpy.array(list(limits.values()))).T
+        self.step = numpy.full(len(self.names), KEY_STEPS[1])
         self.is_length = numpy.array([name.endswith("_m") for name in self.names])
 
     def get_surfaces(self, first, last):
         return tuple((state.solution.vertices, state.solution.triangles) for state in (first, last))
 
-    def make_job(self, values, _folder=None):
+    def show(self, p):
+        """Values of parameters, and what they change for each unit of p."""
+        return numpy.exp(p), numpy.exp(p)
+
+    def make_job(self, p, _folder=None):
+        values, _ = self.show(p)
         job = {key: value for key, value in self.job.items() if key != "accuracy_cents"}
         job["body"] = job["body"] | {name.removeprefix("body."): float(value) for name, value in zip(self.names, values)}
         if "edge_m" not in job["body"]:
             job["body"]["nodes"] = int(job["body"].get("nodes", KEY_NODES) * (self.fineness / 2) ** 2)
         return job
 
-    def calc_velocities(self, solution, values):
+    def calc_velocities(self, solution, p):
         """As Moved.calc_velocities()."""
         points, normal = solution.vertices[solution.sites.vertex], solution.sites.normal
         rows = []
-        for k in range(len(values)):
-            ends = [
-                numpy.clip(values[k] + sign * KEY_STEP * (abs(values[k]) or self.step[k]), self.low[k], self.high[k]) for sign in (1, -1)
-            ]
+        for k in range(len(p)):
             ways = []
-            for end in ends:
-                mesh = self.mesh(self.make_job([*values[:k], end, *values[k + 1 :]]))
+            for step in (KEY_STEPS[0], -KEY_STEPS[0]):
+                mesh = self.mesh(self.make_job([*p[:k], p[k] + step, *p[k + 1 :]]))
                 ways.append(find_way(points, normal, numpy.array(mesh.nodes), grid.find_surface(numpy.array(mesh.tets))))
-            rows.append((ways[0] - ways[1]) / (ends[0] - ends[1]))
+            rows.append((ways[0] - ways[1]) / (2 * KEY_STEPS[0]))
         return numpy.array(rows)
 
 
@@ -295,7 +305,63 @@ def read_limits(text, job):
             raise InputError(f"--free {word!r}: give a key and its limits, like body.wall_m=0.002:0.004") from None
         if isinstance(at, bool) or not isinstance(at, (int, float)):
             raise InputError(f"--free {name}: the job has no such size of a body, like body.wall_m")
-        if not low <= at <= high or low == high:
-            raise InputError(f"--free {word}: the value of the job, {at:g}, is not within the limits")
+        if not 0 < low <= at <= high or low == high:
+            raise InputError(f"--free {word}: the value of the job, {at:g}, is not within the limits, above 0")
         limits[name] = (low, high)
     return limits
+
+
+def read_outline(path):
+    """(n, 3) m: r, z of the middle of the wall and its thickness, along the outline; CSV in mm with that head. InputError."""
+    try:
+        rows = numpy.loadtxt(path, delimiter=",", skiprows=1, ndmin=2) * 1e-3
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: {error}; give rows of r, z, thickness in mm below a head") from None
+    if rows.shape[1:] != (3,) or len(rows) < 4 or not numpy.isfinite(rows).all():
+        raise InputError(f"{path}: give at least four rows of r, z, thickness in mm")
+    if (rows[:, 0] < 0).any() or (rows[:, 2] <= 0).any() or (numpy.linalg.norm(numpy.diff(rows[:, :2], axis=0), axis=1) <= 0).any():
+        raise InputError(f"{path}: r is 0 or more, the thickness above 0, and no two rows are the same place")
+    return rows
+
+
+def make_lathe(job, rows, fineness, knots=8, side="inside", wall_m=None):
+    """A body of revolution about z from an outline (n, 3), turned on one side: depths at knots along the outline, cubic B-splines. The left
+    side of the outline, walked in the order of the rows, is `inside` where it faces the axis."""
+    along = numpy.concatenate([[0], numpy.cumsum(numpy.linalg.norm(numpy.diff(rows[:, :2], axis=0), axis=1))])
+    curve = scipy.interpolate.CubicSpline(along, rows[:, :2])
+    thickness = scipy.interpolate.PchipInterpolator(along, rows[:, 2])
+    length = along[-1]
+    around = 2 * numpy.pi * rows[:, 0].max()
+    edge = max(2 * rows[:, 2].mean(), length / LATHE_CELLS)
+    cells = [4 * max(4, round(fineness * around / edge / 4)), 2 * max(4, round(fineness * length / edge / 2)), max(1, round(fineness / 2))]
+    places, tets = grid.make_grid(cells, is_round=True)
+    s = places[:, 1] * length
+    tangent = curve(s, 1)
+    normal = numpy.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / numpy.linalg.norm(tangent, axis=1, keepdims=True)
+    if numpy.mean(normal[:, 0]) < 0:
+        normal = -normal  # away from the axis
+    turn = 2 * numpy.pi * places[:, 0]
+    wall = thickness(s)
+    flat = curve(s) + normal * (wall * (places[:, 2] - 0.5))[:, None]
+    flat[:, 0] = numpy.maximum(flat[:, 0], 0)
+
+    def revolve(r_z):
+        return numpy.stack([r_z[..., 0] * numpy.cos(turn), r_z[..., 0] * numpy.sin(turn), r_z[..., 1]], axis=-1)
+
+    nodes = revolve(flat)
+    used, tets = grid.tidy(nodes, tets)
+    spacing = length / max(knots - 1, 1)
+    at = numpy.arange(knots) * spacing
+    bases = find_splines(knots, spacing, s)
+    if side not in ("inside", "outside"):
+        raise InputError(f"--remove {side}: an outline is turned inside or outside")
+    way = normal * (1 - places[:, 2])[:, None] if side == "inside" else -normal * places[:, 2][:, None]
+    way[flat[:, 0] <= 0, 0] = 0
+    fields = revolve(bases[:, :, None] * way)[:, used]
+    least = numpy.array([thickness(numpy.clip(numpy.linspace(x - 2 * spacing, x + 2 * spacing, 33), 0, length)).min() for x in at])
+    high = least - (least / 4 if wall_m is None else wall_m)
+    if not (high > 0).all():
+        raise InputError("--wall: the outline is thinner than this")
+    names = [f"{1e3 * x:.1f} mm along the outline" for x in at]
+    marks = find_splines(knots, spacing, at).T
+    return Moved(job, nodes[used], tets, fields, names, numpy.zeros(knots), high, MAX_SHARE * high, marks, smooth=True)

@@ -33,6 +33,7 @@ class State:
     groups: list
     off_cents: numpy.ndarray
     bank: object = None  # path
+    jacobian: object = None  # (wishes, K) by shapes.calc_jacobian(), when it was asked for
     mac: float = 1.0  # least, of the modes it was followed from
 
     @property
@@ -91,6 +92,7 @@ class Search:
         self.run, self.wishes, self.aparts, self.cents, self.folder, self.say = run, wishes, aparts, cents, folder, say
         self.modes = 24
         self.steps = []
+        self.missed = None  # of find_jacobian()
         self.set_wishes(wishes)
 
     def set_wishes(self, wishes):
@@ -142,9 +144,20 @@ class Search:
         _, residual, _ = self.find_apart(body, state)
         return float(numpy.sum((self.weights * state.off_cents) ** 2) + numpy.sum(numpy.square(residual)))
 
-    def find_step(self, body, state):
-        """The step (K), and the system (A, y) in units of body.step that it solves."""
-        jacobian = shapes.calc_jacobian(body, state, state.groups)
+    def find_jacobian(self, body, state):
+        """(wishes, K). Of a body that is meshed again, with what its derivatives missed in all steps so far (secants: Broyden 1965): its
+        parameters change all modes by nearly the same ratio, so an error of a few percent hides what they change of the intervals."""
+        if state.jacobian is None:
+            state.jacobian = shapes.calc_jacobian(body, state, state.groups)
+        return state.jacobian if self.missed is None else state.jacobian + self.missed
+
+    def learn(self, jacobian, state, after):
+        way = after.p - state.p
+        missed = numpy.outer(after.off_cents - state.off_cents - jacobian @ way, way) / (way @ way)
+        self.missed = missed if self.missed is None else self.missed + missed
+
+    def find_step(self, body, state, jacobian):
+        """The step (K)."""
         rows, residual, _ = self.find_apart(body, state)
         a = numpy.concatenate([self.weights[:, None] * jacobian, *([row] for row in rows)]) * body.step
         y = numpy.concatenate([-self.weights * state.off_cents, residual])
@@ -159,7 +172,9 @@ class Search:
         low = numpy.maximum(body.low - state.p, -body.step) / body.step
         high = numpy.minimum(body.high - state.p, body.step) / body.step
         found = scipy.optimize.lsq_linear(
-            numpy.concatenate([a, *extra]), numpy.concatenate([y * min(1.0, FAR_CENTS / numpy.abs(y).max()), *right]), (low - 1e-9, high + 1e-9)
+            numpy.concatenate([a, *extra]),
+            numpy.concatenate([y * min(1.0, FAR_CENTS / numpy.abs(y).max()), *right]),
+            (low - 1e-9, high + 1e-9),
         )
         return numpy.clip(found.x, low, high) * body.step
 
@@ -173,12 +188,15 @@ class Search:
 
     def advance(self, body, state, limit):
         """The next State, or None where no part of the step comes below the limit."""
-        step, share = self.find_step(body, state), 1.0
+        share = 1.0
         while share >= MIN_SHARE:
-            p = state.p + share * step
+            jacobian = self.find_jacobian(body, state)
+            p = state.p + share * self.find_step(body, state, jacobian)
             if numpy.abs(p - state.p).max() < 1e-9:
                 return None
             after = self.visit(body, p, state)
+            if body.is_remeshed:
+                self.learn(jacobian, state, after)
             if after.mac > MIN_SHAPE and self.measure(body, after) < limit:
                 return after
             share /= 2
@@ -218,7 +236,7 @@ class Search:
             body = make_body(FINE)
             state = self.descend(body, self.visit(body, state.p, state), self.cents, "fine")
         reached = self.is_reached(body, state, self.cents)
-        jacobian = shapes.calc_jacobian(body, state, state.groups)
+        jacobian = self.find_jacobian(body, state)
         obstacle = "" if reached else self.find_obstacle(body, state, jacobian)
         return Outcome(first, state, body, jacobian, reached, obstacle, self.steps)
 

@@ -46,14 +46,21 @@ def add_command(commands):
     add("--free", metavar="KEY=LOW:HIGH,...", help="keys of the job to change within these values, like body.wall_m=0.002:0.004")
     add("--map", action="store_true", help="a removal map: local cuts anywhere on the surface")
     add(
+        "--outline",
+        metavar="FILE.csv",
+        help="a body of revolution about z in place of the job's: rows of r, z, thickness in mm (r, z: the middle of the wall), turned at knots "
+        "along the outline",
+    )
+    add(
         "--remove",
         default="",
         metavar="SIDE",
-        help="where material goes: z-min (default) or z-max of a bar; outer, inner or all (default) of a map",
+        help="where material goes: z-min (default) or z-max of a bar; inside (default) or outside of an outline; outer, inner or all (default) "
+        "of a map",
     )
     add("--wall", metavar="LENGTH", help="least wall left, like 3mm (default: a quarter of the thickness)")
     add("--most", metavar="LENGTH", default="0.5mm", help="deepest local cut (default: 0.5mm)")
-    add("--knots", type=int, metavar="N", help="depths along half of a bar (default: 6); of a map: cuts (default: 42)")
+    add("--knots", type=int, metavar="N", help="depths along half of a bar (default: 6), along an outline (8); of a map: cuts (42)")
     add("--cents", type=float, default=0.2, help="largest distance from a wish (default: 0.2)")
     add("--tolerance", metavar="LENGTH", default="0.02mm", help="of the milling, for the guarantee (default: 0.02mm)")
     add("--bin", metavar="FOLDER", help="folder of carillon-precompute (default: next to this program)")
@@ -95,11 +102,15 @@ def run(options):
             mesh = shapes.read_mesh(job, options.job, folder.name, mesher)
             body = shapes.make_map(job, mesh, options.knots or 42, shapes.read_length(options.most), options.remove or "all", wall)
             make_body, start_p = lambda fineness: body, numpy.zeros(len(body.names))
+        elif options.outline:
+            rows, knots = shapes.read_outline(options.outline), options.knots or 8
+            make_body = lambda fineness: shapes.make_lathe(job, rows, fineness, knots, options.remove or "inside", wall)
+            start_p = numpy.zeros(knots)
         elif options.free:
             limits = shapes.read_limits(options.free, job)
             make_mesh = lambda changed: shapes.read_mesh(changed, options.job, folder.name, mesher)
             make_body = lambda fineness: shapes.Keys(job, limits, fineness, make_mesh)
-            start_p = numpy.array([job["body"][name.removeprefix("body.")] for name in limits])
+            start_p = numpy.log([job["body"][name.removeprefix("body.")] for name in limits])
         else:
             knots = options.knots or 6
             make_body = lambda fineness: shapes.make_undercut(job, fineness, knots, options.remove or "z-min", wall)
@@ -107,7 +118,7 @@ def run(options):
         if options.close_pairs:
             outcome = search.close(body, read_counts(options.close_pairs), read_counts(options.keep))
         else:
-            search.set_wishes(targets.read_wishes(options, "" if options.map or options.free else "bending"))
+            search.set_wishes(targets.read_wishes(options, "" if options.map or options.free or options.outline else "bending"))
             outcome = search.tune(make_body, start_p)
         return report(options, outcome, search.wishes, tolerance, solver, out, start)
 
@@ -125,7 +136,9 @@ def read_counts(text):
 
 def report(options, outcome, wishes, tolerance, solver, out, start):
     last, body = outcome.last, outcome.body
-    milling = numpy.abs(outcome.jacobian[:, body.is_length]).sum(axis=1) * tolerance
+    values, by_p = body.show(last.p)
+    rates = outcome.jacobian / by_p
+    milling = numpy.abs(rates[:, body.is_length]).sum(axis=1) * tolerance
     names = [wish.mode for wish in wishes] or [f"pair at {hz:.1f} Hz" for hz in last.hz]
     sure = numpy.abs(last.off_cents) + milling + (last.bars if wishes else 0)
     columns = {
@@ -140,15 +153,15 @@ def report(options, outcome, wishes, tolerance, solver, out, start):
     }
     modes = [{"mode": name or last.solution.kinds[last.groups[k][0]]} for k, name in enumerate(names)]
     for k, mode in enumerate(modes):
-        mode |= {key: float(values[k]) for key, values in columns.items()} | {"cents_per_unit": outcome.jacobian[k].tolist()}
+        mode |= {key: float(values[k]) for key, values in columns.items()} | {"cents_per_unit": rates[k].tolist()}
     rows = [["mode", "before Hz", "wish Hz", "after Hz", "off before", "off", "bar", "milling", "guarantee"]]
     rows += [[mode["mode"], *(f"{mode[key]:{'+' if 'off' in key else ''}.2f}" for key in columns)] for mode in modes]
-    units = numpy.where(body.is_length, 1e-4, 0.01 * numpy.abs(last.p))
+    units = numpy.where(body.is_length, 1e-4, 0.01 * values)
     depths = [["parameter", "value", *(f"cents, {mode['mode']}" for mode in modes)]]
-    for k, (name, value) in enumerate(zip(body.names, body.marks @ last.p)):
+    for k, (name, value) in enumerate(zip(body.names, values)):
         if value > 1e-6 or body.smooth:
             shown = f"{1e3 * value:.3f} mm" if body.is_length[k] else f"{value:.6g}"
-            depths.append([name, shown, *(f"{units[k] * row[k]:+.2f}" for row in outcome.jacobian)])
+            depths.append([name, shown, *(f"{units[k] * row[k]:+.2f}" for row in rates)])
     table = measuring.format_table(rows)
     cpu_s = solver.cpu_s + time.process_time() - start
     text = [
@@ -168,7 +181,7 @@ def report(options, outcome, wishes, tolerance, solver, out, start):
     document = {
         "exit_code": 0 if outcome.reached else NOT_REACHED,
         "modes": modes,
-        "parameters": dict(zip(body.names, last.p.tolist())),
+        "parameters": dict(zip(body.names, values.tolist())),
         "obstacle": outcome.obstacle,
         "solves": solver.solves,
         "cpu_seconds": cpu_s,
