@@ -68,7 +68,7 @@ def draw(path, before_m, after_m, title, table):
     y = top + height + 2 * TEXT
     contours = f", seen from the cut side, depth in mm, contours every {step:g} mm, deepest {most:.3f} mm" if most > 0 else ""
     add_text(MARGIN, y, f"{width:.1f} x {height:.1f} mm{contours}")
-    # Through the deepest place, that nearest to the middle, and beside the vertices.
+    # Through the deepest place, that nearest to the middle, and between the vertices.
     middle = (low + high)[across] / 2
     deepest = before[depth >= most - 1e-6]
     place = deepest[numpy.abs(deepest[:, across] - middle).argmin(), across] + 1e-3

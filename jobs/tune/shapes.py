@@ -1,10 +1,10 @@
 """What a tuning may change: each body is a function of a few parameters, with a mesh and a derivative of its frequencies.
 
-A Moved body has one mesh whose nodes move along fixed fields, X = X0 + sum p_k F_k, p_k being depths in m. So shapes of modes stay comparable
-vertex by vertex, and the derivatives follow from the sensitivities of the bank with the normal part of F_k (docs/equations.md, E7a).
+A Moved body has one mesh whose nodes move along fixed fields, X = X0 + sum p_k F_k, p_k being depths in m. So shapes of modes stay
+comparable vertex by vertex, and the derivatives follow from the sensitivities of the bank with the normal part of F_k
+(docs/equations.md, E7a).
 """
 import dataclasses
-import json
 import pathlib
 import re
 
@@ -56,6 +56,7 @@ class Moved:
     is_remeshed = False  # derivatives are exact to first order
     mesh: object = None  # the MeshFile whose node sets stay
     volumes: numpy.ndarray | None = None  # (K) m^2, of material for each m of depth
+    profile: object = None  # function of p to a table [mm] of the new section: head, rows
     floor: str = "no material can be added there"
     ceiling: str = "the minimum wall is reached there"
 
@@ -152,7 +153,13 @@ def make_undercut(job, fineness, knots=6, side="z-min", wall_m=None):
     at = numpy.arange(knots) * spacing
     names = [f"{1e3 * x:.1f} mm from the middle" for x in at]
     marks = find_bases(at).T
-    return Moved(job, nodes, tets, fields, names, numpy.zeros(knots), top, MAX_SHARE * top, marks, smooth=True)
+
+    def calc_profile(p):
+        x = numpy.arange(0, round(500 * length) + 1) * 1e-3
+        return "from_middle_mm,depth_mm,left_mm", 1e3 * numpy.stack([x, find_bases(x).T @ p, thickness - find_bases(x).T @ p], axis=1)
+
+    low, step = numpy.zeros(knots), MAX_SHARE * top
+    return Moved(job, nodes, tets, fields, names, low, top, step, marks, smooth=True, profile=calc_profile)
 
 
 def read_mesh(job, job_file, folder, mesher):
@@ -241,6 +248,7 @@ class Keys:
     linear. The body is meshed again for each value; fineness scales body.nodes with its square. The motion of the surface is the difference
     of two meshes, of a larger and a smaller value; nothing is solved for it."""
 
+    profile = None
     smooth, is_remeshed, floor, ceiling = False, True, "its least value is reached", "its largest value is reached"
 
     def __init__(self, job, limits, fineness, mesh):
@@ -325,8 +333,7 @@ def read_outline(path):
 
 
 def make_lathe(job, rows, fineness, knots=8, side="inside", wall_m=None):
-    """A body of revolution about z from an outline (n, 3), turned on one side: depths at knots along the outline, cubic B-splines. The left
-    side of the outline, walked in the order of the rows, is `inside` where it faces the axis."""
+    """A body of revolution about z from an outline (n, 3), turned on one side: depths at knots along the outline, cubic B-splines."""
     along = numpy.concatenate([[0], numpy.cumsum(numpy.linalg.norm(numpy.diff(rows[:, :2], axis=0), axis=1))])
     curve = scipy.interpolate.CubicSpline(along, rows[:, :2])
     thickness = scipy.interpolate.PchipInterpolator(along, rows[:, 2])
@@ -364,4 +371,14 @@ def make_lathe(job, rows, fineness, knots=8, side="inside", wall_m=None):
         raise InputError("--wall: the outline is thinner than this")
     names = [f"{1e3 * x:.1f} mm along the outline" for x in at]
     marks = find_splines(knots, spacing, at).T
-    return Moved(job, nodes[used], tets, fields, names, numpy.zeros(knots), high, MAX_SHARE * high, marks, smooth=True)
+
+    def calc_profile(p):
+        x = numpy.linspace(0, length, 4 * len(rows))
+        cut = find_splines(knots, spacing, x).T @ p
+        across = curve(x, 1)[:, ::-1] * [1, -1] / numpy.linalg.norm(curve(x, 1), axis=1, keepdims=True)
+        across *= numpy.sign(across[:, 0].mean())
+        middle = curve(x) + across * (cut / 2 * (1 if side == "inside" else -1))[:, None]
+        return "r_mm,z_mm,thickness_mm", 1e3 * numpy.column_stack([middle, thickness(x) - cut])
+
+    low, step = numpy.zeros(knots), MAX_SHARE * high
+    return Moved(job, nodes[used], tets, fields, names, low, high, step, marks, smooth=True, profile=calc_profile)

@@ -1,7 +1,7 @@
 """Bounded Gauss-Newton steps of a body's parameters towards wished frequencies, with modes followed by their shapes.
 
-Method: least squares of the derivatives by cuts, within bounds and a largest step (scipy's lsq_linear: Branch, Coleman and Li 1999); a step is
-halved until the residual falls. Modes are followed by the modal assurance criterion, so crossings do not exchange them.
+Method: least squares of the derivatives by cuts, within bounds and a largest step (scipy's lsq_linear: Branch, Coleman and Li 1999); a step
+is halved until the residual falls. Modes are followed by the modal assurance criterion, so crossings do not exchange them.
 """
 import dataclasses
 
@@ -306,7 +306,7 @@ class Search:
         return p, numpy.abs(a @ found.x[:count] - y)
 
     def find_obstacle(self, body, state, jacobian):
-        """The worst mode, and the bound that a step towards the wishes presses hardest upon; with what first order leaves within all bounds."""
+        """The worst mode, and the bound that a step towards the wishes presses hardest upon."""
         worst = int(numpy.argmax(numpy.abs(self.weights * state.off_cents)))
         name = self.wishes[worst].mode or f"the mode near {self.wishes[worst].hz:.6g} Hz"
         pull = -(jacobian * self.weights[:, None]).T @ (self.weights * state.off_cents) * body.step  # wish to raise p

@@ -24,7 +24,7 @@ def add_command(commands):
     parser = commands.add_parser(
         "tune",
         help="material removed, or keys of a job changed, until modes have the wished frequencies",
-        description="Tunes the body of a job: a bar by an undercut, any body by a removal map or by keys of its job, a bell by its outline. "
+        description="Tunes the body of a job: a bar by an undercut, any body by a removal map or sizes of its job, a bell by its outline. "
         "Writes the new job, meshes of the body and of the cut, a drawing in mm, the bank and a table. Exit code 5: not reached; the table "
         "says which mode and bound are in the way, and the files are the best that was found.",
     )
@@ -36,8 +36,12 @@ def add_command(commands):
     add("--fundamental", metavar="HZ|NOTE", help="frequency of ratio 1, like 220 or A3 (A4 is 440 Hz)")
     add("--hz", metavar="HZ|NOTE,...", help="frequencies or notes, like 2637,E8:0.5")
     add("--bell", choices=sorted(targets.BELLS), help="five partials of a church bell around the prime, the fundamental")
-    add("--modes", metavar="KIND N,...", help='the modes of these frequencies: "bending 1,torsion 1", "n=2", "mode 3" (default: of a bar that '
-        "is undercut bending 1, bending 2, ..., else the nearest)")  # fmt: skip
+    add(
+        "--modes",
+        metavar="KIND N,...",
+        help='the modes of these frequencies: "bending 1,torsion 1", "n=2", "mode 3" (default: bending 1, bending 2, ... of a bar that is '
+        "undercut, else the nearest)",
+    )
     add(
         "--apart", metavar="KIND:CENTS", action="append", default=[], help="modes of this kind stay so far from every wish, like torsion:50"
     )
@@ -48,15 +52,15 @@ def add_command(commands):
     add(
         "--outline",
         metavar="FILE.csv",
-        help="a body of revolution about z in place of the job's: rows of r, z, thickness in mm (r, z: the middle of the wall), turned at knots "
-        "along the outline",
+        help="a body of revolution about z in place of the job's: rows of r, z, thickness in mm (r, z: the middle of the wall), turned at "
+        "knots along the outline",
     )
     add(
         "--remove",
         default="",
         metavar="SIDE",
-        help="where material goes: z-min (default) or z-max of a bar; inside (default) or outside of an outline; outer, inner or all (default) "
-        "of a map",
+        help="where material goes: z-min (default) or z-max of a bar; inside (default) or outside of an outline; outer, inner or all "
+        "(default) of a map",
     )
     add("--wall", metavar="LENGTH", help="least wall left, like 3mm (default: a quarter of the thickness)")
     add("--most", metavar="LENGTH", default="0.5mm", help="deepest local cut (default: 0.5mm)")
@@ -206,4 +210,7 @@ def write_files(out, outcome, options, table):
     grid.write_obj(out / "body.obj", *after)
     if before[1] is after[1]:
         grid.write_stl(out / "cut.stl", *grid.find_cut(before[0], *after))
+    if body.profile:
+        head, rows = body.profile(p)
+        numpy.savetxt(out / "profile.csv", rows, fmt="%.4f", delimiter=",", header=head, comments="")
     drawing.draw(out / "drawing.svg", before, after, f"{pathlib.Path(options.job).stem}, tuned", table)

@@ -1,0 +1,308 @@
+#!/usr/bin/python3
+"""carillon tune, from outside: bars from flat, beats, keys of a job, outlines, wishes that cannot be reached. Results are solved again.
+
+usage: tune_test.py BIN_DIR [CLASS ...]
+"""
+import json
+import math
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy
+
+BIN = pathlib.Path(sys.argv.pop(1)).resolve()
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "jobs/tune"), str(ROOT / "jobs/study")]
+import grid
+import mesh_file
+import shapes
+import solver
+import targets
+
+ALUMINIUM = {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"internal_friction": {"tan_phi": 0.0005}}}
+ROSEWOOD = {
+    "orthotropic": {
+        "young_modulus_pa": [16e9, 2.2e9, 1.1e9],
+        "shear_modulus_pa": [1.6e9, 0.5e9, 1.2e9],
+        "poisson_ratio": [0.36, 0.46, 0.5],
+        "axes": [[1, 0, 0], [0, 1, 0]],
+    },
+    "density_kg_m3": 900,
+    "damping": {"internal_friction": {"tan_phi": 0.006}},
+}
+PLANK = {"body": {"shape": "bar", "length_m": 0.36, "width_m": 0.05, "thickness_m": 0.0132}, "material": ALUMINIUM, "bank": "plank.hdf"}
+WOOD = {"body": {"shape": "bar", "length_m": 0.33, "width_m": 0.038, "thickness_m": 0.024}, "material": ROSEWOOD, "bank": "wood.hdf"}
+CUP = {
+    "body": {"shape": "bowl", "outer_radius_m": 0.05, "wall_m": 0.003, "opening_angle_deg": 100},
+    "material": ALUMINIUM,
+    "bank": "cup.hdf",
+}
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def tune(self, job, *words, code=0):
+        """The document of a tuning into `out`."""
+        (self.folder / "job.json").write_text(json.dumps(job))
+        command = [BIN / "carillon-tune", "tune", "job.json", *words, "-o", "out", "--json"]
+        done = subprocess.run(list(map(str, command)), cwd=self.folder, capture_output=True, text=True, timeout=600)
+        self.assertEqual(done.returncode, code, done.stdout[-2000:] + done.stderr)
+        self.assertNotIn("NaN", done.stdout)
+        return json.loads(done.stdout)
+
+    def solve(self, job, modes=16):
+        """The Solution of a job with kinds."""
+        (self.folder / "solved.json").write_text(json.dumps(job))
+        return solver.Solver(BIN / "carillon-precompute", self.folder / "solved.json").solve(
+            job | {"max_modes": modes}, sensitivities=modes
+        )
+
+    def check_finer(self, job, result, wall_m, wishes_hz):
+        """The design on a mesh twice as fine: within half a cent and within the bars there."""
+        body = shapes.make_undercut(job, 4.0, 6, "z-min", wall_m)
+        fine = self.solve(body.make_job(numpy.array(result["steps"][-1]["parameters"]), self.folder), 8)
+        for number, hz in enumerate(wishes_hz, 1):
+            mode = targets.find_groups(fine, [targets.Wish(f"bending {number}", hz)])[0][0]
+            off = 1200 * math.log2(fine.corrected_hz[mode] / hz)
+            self.assertLess(abs(off), 0.5)
+            self.assertLess(abs(off), fine.bar_cents[mode])
+
+
+class Bars(Case):
+    def test_flat_bar_becomes_a_vibraphone_bar(self):
+        """Two octaves and three octaves and a third above the fundamental, and the torsion, which crosses, is never taken for a bending."""
+        done = self.tune(PLANK, "--partials", "1,4,10", "--fundamental", "185", "--wall", "3mm")
+        self.assertLessEqual(done["solves"], 15)
+        for mode, ratio in zip(done["modes"], (1, 4, 10)):
+            self.assertAlmostEqual(mode["wish_hz"], 185 * ratio)
+            self.assertLess(abs(mode["off_cents"]), 0.2)
+            self.assertAlmostEqual(mode["guarantee_cents"], abs(mode["off_cents"]) + mode["bar_cents"] + mode["milling_cents"])
+        out = self.folder / "out"
+        again = json.loads((out / "job.json").read_text())
+        solved = self.solve(again | {"mesh": str(out / again["mesh"])})
+        torsion = solved.corrected_hz[targets.find_kind(solved, "torsion")[0][0]]
+        for number, mode in enumerate(done["modes"]):
+            self.assertAlmostEqual(solved.corrected_hz[targets.find_kind(solved, "bending")[number][0]] / mode["after_hz"], 1, 6)
+        self.assertLess(abs(1200 * math.log2(torsion / 740)), 600)  # it was 600 cents above the second bending mode
+        profile = numpy.loadtxt(out / "profile.csv", delimiter=",", skiprows=1)
+        self.assertGreaterEqual(profile[:, 1].min(), 0)
+        self.assertGreaterEqual(profile[:, 2].min(), 3 - 1e-9)
+        self.assertEqual(profile[-1, 1], 0)
+        for name in ("body.stl", "body.obj", "cut.stl", "drawing.svg", "table.txt", "bank.hdf", "bank.hdf.resolved.json"):
+            self.assertTrue((out / name).stat().st_size > 0, name)
+        self.assertAlmostEqual(self.find_volume(out / "body.stl") + self.find_volume(out / "cut.stl"), 360 * 50 * 13.2, delta=1)
+
+    def find_volume(self, path):
+        """mm^3 in a binary STL, positive only if its triangles are closed and face outwards."""
+        content = path.read_bytes()
+        rows = numpy.frombuffer(content[84:], dtype=[("v", "<f4", (4, 3)), ("a", "<u2")])
+        corners = rows["v"][:, 1:].astype(float)
+        return float(numpy.einsum("tx,tx->t", corners[:, 0], numpy.cross(corners[:, 1], corners[:, 2])).sum() / 6)
+
+    def test_wood_from_flat_with_two_elements_across(self):
+        done = self.tune(WOOD, "--partials", "1,3,6", "--fundamental", "C5", "--wall", "6mm")
+        self.assertLessEqual(done["solves"], 15)
+        self.assertAlmostEqual(done["modes"][0]["wish_hz"], 523.2511, 3)
+        for mode in done["modes"]:
+            self.assertLess(abs(mode["off_cents"]), 0.2)
+
+    def test_torsion_stays_apart(self):
+        self.tune(PLANK, "--partials", "1,4,10", "--fundamental", "185", "--wall", "3mm", "--apart", "torsion:50")
+        solved = self.solve(json.loads((self.folder / "out/job.json").read_text()) | {"mesh": str(self.folder / "out/body.msh")})
+        for group in targets.find_kind(solved, "torsion"):
+            for hz in (185, 740, 1850):
+                self.assertGreater(abs(1200 * math.log2(solved.corrected_hz[group[0]] / hz)), 50 - 1)
+
+
+class Unreachable(Case):
+    """Exit code 5, the mode and the bound, and the best body."""
+
+    def check(self, words, *parts):
+        done = self.tune(PLANK, *words, code=5)
+        for part in parts:
+            self.assertIn(part, done["obstacle"])
+        self.assertTrue((self.folder / "out/body.msh").exists())
+        self.assertTrue(all(math.isfinite(mode[key]) for mode in done["modes"] for key in ("after_hz", "off_cents", "guarantee_cents")))
+        return done
+
+    def test_above_the_flat_bar(self):
+        done = self.check(["--hz", "700", "--wall", "3mm"], "bending 1", "no material can be added")
+        self.assertEqual(max(done["parameters"].values()), 0)
+
+    def test_wall_at_its_minimum(self):
+        done = self.check(["--hz", "90", "--wall", "8mm"], "bending 1", "minimum wall")
+        self.assertLessEqual(max(done["parameters"].values()), 0.0052 + 1e-9)
+
+    def test_groove_is_a_local_minimum(self):
+        done = self.check(["--partials", "1,2,10", "--fundamental", "300", "--wall", "3mm"], "no material can be added")
+        self.assertLess(sum(m["off_cents"] ** 2 for m in done["modes"]), sum(m["off_before_cents"] ** 2 for m in done["modes"]))
+
+    def test_bad_input(self):
+        for words, part in (
+            (["--partials", "1,4"], "--fundamental"),
+            (["--hz", "H5"], "H5"),
+            (["--hz", "200", "--modes", "breathing 1"], "breathing 1"),
+            (["--hz", "200", "--wall", "20mm"], "--wall"),
+            (["--hz", "200", "--remove", "left"], "left"),
+            (["--hz", "200", "--apart", "torsion"], "torsion"),
+            (["--hz", "200", "--free", "body.wall_m=1:2"], "body.wall_m"),
+        ):
+            done = self.tune(PLANK, *words, code=2)
+            self.assertIn(part, done["error"])
+
+
+def cast_bowl(folder, nodes=6000):
+    """A bowl with the bumps of a casting, mesh `cast.msh`."""
+    words = ["--shape", "bowl", "--outer-radius", "0.06", "--wall", "0.004", "--nodes", nodes, "--order", "2", "-q", "-o", "bowl.msh"]
+    subprocess.run([BIN / "carillon-mesh", *map(str, words)], cwd=folder, check=True)
+    mesh = mesh_file.MeshFile(folder / "bowl.msh")
+    nodes = numpy.array(mesh.nodes)
+    radius = numpy.linalg.norm(nodes, axis=1, keepdims=True)
+    to = nodes / radius
+    random = numpy.random.default_rng(3)
+    bump = numpy.zeros(len(nodes))
+    for height in [5e-4, 5e-4, *random.normal(0, 5e-5, 38)]:
+        at = random.normal(size=3) * [1, 1, -1]
+        at[2] = -abs(at[2])
+        bump += height * numpy.exp(-((numpy.arccos(numpy.clip(to @ at / numpy.linalg.norm(at), -1, 1)) / 0.25) ** 2))
+    mesh.nodes = (nodes + to * bump[:, None] * (radius - 0.056) / 0.004).tolist()
+    mesh.write(folder / "cast.msh")
+    return {"mesh": "cast.msh", "material": "aluminium", "bank": "cast.hdf"}
+
+
+class Shells(Case):
+    def test_beats_of_a_cast_bowl_close(self):
+        done = self.tune(cast_bowl(self.folder), "--close-pairs", "1,2", "--remove", "outer", "--cents", "0.1")
+        self.assertLessEqual(done["solves"], 3)
+        self.assertGreater(done["modes"][0]["off_before_cents"], 12)
+        for mode in done["modes"]:
+            self.assertLess(mode["off_cents"], 0.1)
+        self.assertLessEqual(max(done["parameters"].values()), 0.0005)
+        again = self.solve(json.loads((self.folder / "out/job.json").read_text()) | {"mesh": str(self.folder / "out/body.msh")}, 8)
+        self.assertLess(1200 * math.log2(again.freq_hz[1] / again.freq_hz[0]), 0.1)
+
+    def test_sizes_of_a_cup_are_found_again(self):
+        """A cup of other sizes has the wished frequencies; its pairs stay pairs."""
+        job = CUP | {"body": CUP["body"] | {"wall_m": 0.004, "opening_angle_deg": 130, "nodes": 16000}}
+        there = self.solve(job, 8)
+        wishes = ",".join(f"{there.corrected_hz[m]:.4f}" for m in (0, 2))
+        limits = "body.wall_m=0.001:0.012,body.opening_angle_deg=60:240"
+        done = self.tune(CUP, "--hz", wishes, "--modes", "n=2,n=3", "--free", limits, "--cents", "0.5")
+        self.assertAlmostEqual(done["parameters"]["body.wall_m"], 0.004, delta=0.0001)
+        self.assertAlmostEqual(done["parameters"]["body.opening_angle_deg"], 130, delta=2)
+
+
+class Long(Case):
+    """Minutes: meshes twice as fine, a bell in three dimensions."""
+
+    def test_vibraphone_bar_on_a_finer_mesh(self):
+        done = self.tune(PLANK, "--partials", "1,4,10", "--fundamental", "185", "--wall", "3mm")
+        self.check_finer(PLANK, done, 0.003, (185, 740, 1850))
+
+    def test_xylophone_bar_on_a_finer_mesh(self):
+        done = self.tune(WOOD, "--partials", "1,3,6", "--fundamental", "523.25", "--wall", "6mm")
+        self.check_finer(WOOD, done, 0.006, (523.25, 3 * 523.25, 6 * 523.25))
+
+    def test_bell_cast_too_thick_is_turned_inside(self):
+        """The frequencies of a bell, from one that is 2 mm thicker inside."""
+        s = numpy.linspace(0, 1, 25)
+        middle = numpy.stack([0.09 + 0.05 * s + 0.11 * s**5, -0.35 * s], axis=1)
+        wall = 0.012 + 0.008 * s**3
+        tangent = numpy.gradient(middle, axis=0)
+        outwards = numpy.stack([-tangent[:, 1], tangent[:, 0]], axis=1) / numpy.linalg.norm(tangent, axis=1, keepdims=True)
+        more = 0.002 + 0.0004 * numpy.sin(9 * s)
+        job = CUP | {"material": "bronze"}
+        rows = numpy.column_stack([middle, wall])
+        true = self.solve(shapes.make_lathe(job, rows, 2.0).make_job(numpy.zeros(8), self.folder), 12)
+        modes = ("n=2", "n=2 2", "n=3", "n=2 3")
+        wishes = [true.corrected_hz[group[0]] for group in targets.find_groups(true, [targets.Wish(mode, 1.0) for mode in modes])]
+        thick = 1e3 * numpy.column_stack([middle - outwards * more[:, None] / 2, wall + more])
+        numpy.savetxt(self.folder / "thick.csv", thick, delimiter=",", header="r,z,thickness", comments="")
+        words = ["--outline", "thick.csv", "--modes", ",".join(modes), "--hz", ",".join(f"{hz:.4f}" for hz in wishes), "--wall", "4mm"]
+        done = self.tune(job, *words)
+        self.assertLessEqual(done["solves"], 10)
+        outline = shapes.read_outline(self.folder / "out/profile.csv")
+        finer = self.solve(shapes.make_lathe(job, outline, 3.0).make_job(numpy.zeros(8), self.folder), 12)
+        for mode, hz in zip(modes, wishes):
+            group = targets.find_groups(finer, [targets.Wish(mode, hz)])[0]
+            self.assertLess(abs(1200 * math.log2(finer.corrected_hz[group[0]] / hz)), 1)
+
+
+class Sensitivities(Case):
+    """Changes by a spot cut of 0.1 mm from the bank of a body against new solves, relative to the larger of a mode's own change and 5 % of
+    the largest: 1 % at the median, 5 % at worst, of the modes with bars up to 5 cents."""
+
+    def check(self, body, p, radius_m, at):
+        """Cuts +-0.05 mm deep around a point of the surface, in addition to the depths p."""
+        nodes = body.place(p)
+        triangles = grid.find_surface(body.tets)
+        normal, _ = shapes.find_normals(nodes, triangles)
+        surface = numpy.unique(triangles)
+        near = surface[numpy.linalg.norm(nodes[surface] - at, axis=1).argmin()]
+        share = numpy.linalg.norm(nodes[surface] - nodes[near], axis=1) / radius_m
+        depth = numpy.where((share < 1) & (normal[surface] @ normal[near] > 0.5), (1 - share**2) ** 2, 0)
+        field = grid.spread(nodes, body.tets, surface, -depth[:, None] * normal[surface])
+        one = numpy.ones(1)
+        spot = shapes.Moved(body.job, nodes, body.tets, field[None], ["spot"], -one, one, one, numpy.eye(1), mesh=body.mesh)
+        found = self.solve(spot.make_job(0 * one, self.folder))
+        low, high = (self.solve(spot.make_job(depth * one, self.folder)).freq_hz for depth in (-5e-5, 5e-5))
+        state = type("State", (), {"solution": found, "p": 0 * one})()
+        entries = 1e-4 * shapes.calc_entries(spot, state)[:, 0]
+        order = numpy.argsort(found.freq_hz)
+        true = 1200 * numpy.log2(high / low)[order]
+        matrix = numpy.diag(1200 * numpy.log2(found.freq_hz / found.freq_hz.min()))
+        ends = []
+        for sign in (-0.5, 0.5):
+            moved = matrix.copy()
+            for (i, j), entry in zip(found.sites.columns, entries):
+                moved[i, j] += sign * entry
+                moved[j, i] = moved[i, j]
+            ends.append(numpy.sort(numpy.linalg.eigvalsh(moved)))
+        error = numpy.abs(ends[1] - ends[0] - true)
+        sure = found.bar_cents[order] <= 5  # as of a mesh of accuracy_cents 5
+        self.assertGreater(sure.sum(), 5)
+        error = error[sure] / numpy.maximum(numpy.abs(true[sure]), 0.05 * numpy.abs(true[sure]).max())
+        print(f"{self.id()}: {len(nodes)} nodes, {sure.sum()} modes, median {100 * numpy.median(error):.2f} %, worst {100 * error.max():.2f} %")
+        self.assertLess(numpy.median(error), 0.01)
+        self.assertLess(error.max(), 0.05)
+
+    def test_bar(self):
+        self.check(shapes.make_undercut(PLANK, 2.0), numpy.zeros(6), 0.02, [0.06, 0.01, 0.0066])
+
+    def test_undercut_bar(self):
+        depths = numpy.array([5.8, 9.2, 7.2, 4, 2.4, 4.5]) * 1e-3
+        self.check(shapes.make_undercut(PLANK, 2.0), depths, 0.02, [0.06, 0.01, 0])
+
+    def test_wooden_bar(self):
+        depths = numpy.array([8, 9, 9, 8, 5, 2]) * 1e-3
+        self.check(shapes.make_undercut(WOOD, 3.0), depths, 0.015, [0.05, 0.005, 0])
+
+    def test_plate_with_a_dimple(self):
+        job = PLANK | {"body": {"shape": "plate", "length_m": 0.2, "width_m": 0.15, "thickness_m": 0.004}}
+        plate = shapes.make_undercut(job, 2.0)
+        x, y, _ = plate.nodes.T
+        plate.nodes[:, 2] += 0.0015 * numpy.exp(-((x - 0.03) ** 2 + (y - 0.02) ** 2) / 0.02**2) * (0.5 - plate.nodes[:, 2] / 0.004)
+        self.check(plate, numpy.zeros(6), 0.012, [-0.01, 0.02, 0.002])
+
+    def make_shape(self, job, *words):
+        subprocess.run([BIN / "carillon-mesh", *words, "--order", "2", "-q", "-o", "start.msh"], cwd=self.folder, check=True)
+        return shapes.make_map(job, mesh_file.MeshFile(self.folder / "start.msh"), 1, 1e-4)
+
+    def test_bowl(self):
+        words = "--shape bowl --outer-radius 0.06 --wall 0.004 --nodes 20000"
+        self.check(self.make_shape(PLANK, *words.split()), numpy.zeros(1), 0.01, [0.03, 0.03, -0.0424])
+
+    def test_fixed_bar(self):
+        words = "--shape bar --length 0.3 --width 0.03 --thickness 0.012 --nodes 8000"
+        self.check(self.make_shape(PLANK | {"fixed": ["x-min"]}, *words.split()), numpy.zeros(1), 0.015, [0.05, 0, 0.006])
+
+
+if __name__ == "__main__":
+    unittest.main()
