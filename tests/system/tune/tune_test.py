@@ -71,6 +71,7 @@ class Case(unittest.TestCase):
         for number, hz in enumerate(wishes_hz, 1):
             mode = targets.find_groups(fine, [targets.Wish(f"bending {number}", hz)])[0][0]
             off = 1200 * math.log2(fine.corrected_hz[mode] / hz)
+            print(f"{self.id()}: {wishes_hz[0]:.2f} x {number}: {off:+.3f} cents, bar {fine.bar_cents[mode]:.3f}")
             self.assertLess(abs(off), 0.5)
             self.assertLess(abs(off), fine.bar_cents[mode])
 
@@ -236,11 +237,11 @@ class Long(Case):
 
 
 class Sensitivities(Case):
-    """Changes by a spot cut of 0.1 mm from the bank of a body against new solves, relative to the larger of a mode's own change and 5 % of
+    """Changes by a spot cut of 0.01 mm from the bank of a body against new solves, relative to the larger of a mode's own change and 5 % of
     the largest: 1 % at the median, 5 % at worst, of the modes with bars up to 5 cents."""
 
     def check(self, body, p, radius_m, at):
-        """Cuts +-0.05 mm deep around a point of the surface, in addition to the depths p."""
+        """Cuts 0.01 mm deep around a point of the surface, in addition to the depths p."""
         nodes = body.place(p)
         triangles = grid.find_surface(body.tets)
         normal, _ = shapes.find_normals(nodes, triangles)
@@ -252,33 +253,31 @@ class Sensitivities(Case):
         one = numpy.ones(1)
         spot = shapes.Moved(body.job, nodes, body.tets, field[None], ["spot"], -one, one, one, numpy.eye(1), mesh=body.mesh)
         found = self.solve(spot.make_job(0 * one, self.folder))
-        low, high = (self.solve(spot.make_job(depth * one, self.folder)).freq_hz for depth in (-5e-5, 5e-5))
+        cut = self.solve(spot.make_job(1e-5 * one, self.folder))
         state = type("State", (), {"solution": found, "p": 0 * one})()
-        entries = 1e-4 * shapes.calc_entries(spot, state)[:, 0]
-        order = numpy.argsort(found.freq_hz)
-        true = 1200 * numpy.log2(high / low)[order]
+        before, after = (1200 * numpy.log2(numpy.sort(solved.freq_hz) / found.freq_hz.min()) for solved in (found, cut))
         matrix = numpy.diag(1200 * numpy.log2(found.freq_hz / found.freq_hz.min()))
-        ends = []
-        for sign in (-0.5, 0.5):
-            moved = matrix.copy()
-            for (i, j), entry in zip(found.sites.columns, entries):
-                moved[i, j] += sign * entry
-                moved[j, i] = moved[i, j]
-            ends.append(numpy.sort(numpy.linalg.eigvalsh(moved)))
-        error = numpy.abs(ends[1] - ends[0] - true)
+        for (i, j), entry in zip(found.sites.columns, 1e-5 * shapes.calc_entries(spot, state)[:, 0]):
+            matrix[i, j] += entry
+            matrix[j, i] = matrix[i, j]
+        true = after - before
+        error = numpy.abs(numpy.linalg.eigvalsh(matrix) - after)
+        order = numpy.argsort(found.freq_hz)
         sure = found.bar_cents[order] <= 5  # as of a mesh of accuracy_cents 5
         self.assertGreater(sure.sum(), 5)
         error = error[sure] / numpy.maximum(numpy.abs(true[sure]), 0.05 * numpy.abs(true[sure]).max())
-        print(f"{self.id()}: {len(nodes)} nodes, {sure.sum()} modes, median {100 * numpy.median(error):.2f} %, worst {100 * error.max():.2f} %")
+        print(
+            f"{self.id()}: {len(nodes)} nodes, {sure.sum()} modes, median {100 * numpy.median(error):.2f} %, worst {100 * error.max():.2f} %"
+        )
         self.assertLess(numpy.median(error), 0.01)
         self.assertLess(error.max(), 0.05)
 
     def test_bar(self):
-        self.check(shapes.make_undercut(PLANK, 2.0), numpy.zeros(6), 0.02, [0.06, 0.01, 0.0066])
+        self.check(shapes.make_undercut(PLANK, 2.5), numpy.zeros(6), 0.02, [0.06, 0.01, 0.0066])
 
     def test_undercut_bar(self):
         depths = numpy.array([5.8, 9.2, 7.2, 4, 2.4, 4.5]) * 1e-3
-        self.check(shapes.make_undercut(PLANK, 2.0), depths, 0.02, [0.06, 0.01, 0])
+        self.check(shapes.make_undercut(PLANK, 3.0), depths, 0.02, [0.06, 0.01, 0])
 
     def test_wooden_bar(self):
         depths = numpy.array([8, 9, 9, 8, 5, 2]) * 1e-3
@@ -300,7 +299,7 @@ class Sensitivities(Case):
         self.check(self.make_shape(PLANK, *words.split()), numpy.zeros(1), 0.01, [0.03, 0.03, -0.0424])
 
     def test_fixed_bar(self):
-        words = "--shape bar --length 0.3 --width 0.03 --thickness 0.012 --nodes 8000"
+        words = "--shape bar --length 0.3 --width 0.03 --thickness 0.012 --nodes 16000"
         self.check(self.make_shape(PLANK | {"fixed": ["x-min"]}, *words.split()), numpy.zeros(1), 0.015, [0.05, 0, 0.006])
 
 
