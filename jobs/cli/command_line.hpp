@@ -19,7 +19,9 @@ struct HandedOver {
 inline constexpr HandedOver kHandedOver[] = {
     {"study", "carillon-study", "Studies: scaling JOB.json, advise BODY --cents 5; see carillon study --help"},
     {"match", "carillon-tune", "The material of a body from a recording: match JOB.json SOUND.wav; see carillon match --help", true},
-    {"sensitivity", "carillon-tune", "Where to cut a body: sensitivity BANK; see carillon sensitivity --help", true}};
+    {"sensitivity", "carillon-tune", "Where to cut a body: sensitivity BANK; see carillon sensitivity --help", true},
+    {"tune", "carillon-tune",
+     "A body cut to wished frequencies: tune JOB.json --partials 1,4,10 --fundamental 185; see carillon tune --help", true}};
 
 /// Index of the command name, after the global options; argc if there is none.
 int find_command(int argc, char** argv);

@@ -1,9 +1,10 @@
-"""carillon-tune: bodies matched to recordings, and where to cut them.
+"""carillon-tune: bodies matched to recordings, and tuned to wished frequencies.
 
     carillon-tune match JOB.json SOUND.wav|PEAKS.csv [-o FOLDER] [--mass 0.2126kg] [--tolerance 0.05mm]
+    carillon-tune tune JOB.json --partials 1,4,10 --fundamental 185 --wall 3mm [-o FOLDER]
     carillon-tune sensitivity BANK [--cut 0.1mm] [--at X,Y,Z --radius 10mm] [-o map.csv|png|glb]
 
-Exit codes: 0 done, 2 bad input, 3 a solve failed, 4 system error.
+Exit codes: 0 done, 2 bad input, 3 a solve failed, 4 system error, 5 tuned as far as possible, wishes not reached.
 """
 import argparse
 import json
@@ -16,6 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: threads gain
 try:
     import match
     import sensitivity
+    import tune
 except ImportError as error:
     print(f"carillon-tune: error: {error}; install python3-numpy, python3-scipy and python3-h5py", file=sys.stderr)
     sys.exit(4)
@@ -31,6 +33,7 @@ def make_parser():
     commands = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
     match.add_command(commands)
     sensitivity.add_command(commands)
+    tune.add_command(commands)
     return parser
 
 
@@ -38,7 +41,7 @@ def run(arguments):
     options = make_parser().parse_args(arguments)
     text, document = options.run(options)
     print(json.dumps(document, indent=2) if options.json else text)
-    return 0
+    return document.get("exit_code", 0)
 
 
 def main():

@@ -4,6 +4,8 @@ import dataclasses
 import json
 import os
 import pathlib
+import shutil
+import subprocess
 import tempfile
 
 import h5py
@@ -12,12 +14,24 @@ import scipy.optimize
 import scipy.spatial
 
 import measuring
-from errors import InputError
+from errors import InputError, RunError
 
 # What decides the frequencies; the air, large motion, queue and files of a job do not.
 KEYS = ("mesh", "mesh_scale", "shape", "body", "accuracy_cents", "material", "band_hz", "max_modes", "element", "mass", "fixed", "solver")
 BAR_SHARES = {0: 1 / 2, 1: 1 / 3}  # of the mesh's bar, by modes/correction: docs/bank-format.md
 MAX_VERTICES = 2000  # sampled to compare shapes
+
+
+@dataclasses.dataclass(frozen=True)
+class Sites:
+    """Sensitivities of a bank (docs/bank-format.md), modes numbered as in the Solution. S sites, C columns."""
+
+    columns: numpy.ndarray  # (C, 2) i, i: mode i; i, j: off-diagonal entry of a pair
+    density: numpy.ndarray  # (S, C) cents per mm and m^2
+    vertex: numpy.ndarray  # (S)
+    normal: numpy.ndarray  # (S, 3)
+    area_m2: numpy.ndarray  # (S)
+    doubtful: numpy.ndarray  # (S) bool
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,6 +47,9 @@ class Solution:
     mass_kg: float
     volume_m3: float
     job: dict  # as resolved: the material in numbers
+    triangles: numpy.ndarray  # (T, 3)
+    sites: Sites | None = None  # of solve(sensitivities=...)
+    kinds: tuple = ()  # (m) as carillon-bank info names them; "" if unknown
 
 
 class Solver:
@@ -40,11 +57,14 @@ class Solver:
 
     def __init__(self, program, job_file, timeout_s=3600):
         self.program, self.job_file, self.timeout_s = program, pathlib.Path(job_file), timeout_s
+        self.solves, self.cpu_s = 0, 0.0
         measuring.run_part([program, "--validate", self.job_file.resolve()], self.job_file.resolve().parent, self.job_file)
 
-    def solve(self, job):
-        """The Solution of a job; RunError of carillon-precompute."""
+    def solve(self, job, sensitivities=0, keep=None):
+        """The Solution of a job, with sensitivities and kinds of so many modes. keep: path of its bank. RunError of the solver."""
         job = {key: job[key] for key in KEYS if key in job} | {"shapes": "exact", "bank": "bank.hdf"}
+        if sensitivities:
+            job["sensitivities"] = sensitivities
         base = self.job_file.resolve().parent
         if "mesh" in job:
             job["mesh"] = str(base / job["mesh"])
@@ -53,8 +73,24 @@ class Solver:
         with tempfile.TemporaryDirectory(prefix="carillon-tune-") as name:
             folder = pathlib.Path(name)
             (folder / "job.json").write_text(json.dumps(job))
-            measuring.run_part([self.program, "-q", "job.json"], folder, self.job_file, timeout_s=self.timeout_s)
-            return read_bank(folder / "bank.hdf", self.job_file)
+            cost = measuring.run_part([self.program, "-q", "job.json"], folder, self.job_file, timeout_s=self.timeout_s)
+            self.solves, self.cpu_s = self.solves + 1, self.cpu_s + cost.cpu_s
+            solution = read_bank(folder / "bank.hdf", self.job_file)
+            if sensitivities:
+                solution = dataclasses.replace(solution, kinds=self.find_kinds(folder / "bank.hdf"))
+            if keep:
+                for ending in ("", ".resolved.json"):
+                    shutil.copyfile(f"{folder / 'bank.hdf'}{ending}", f"{keep}{ending}")
+            return solution
+
+    def find_kinds(self, bank):
+        """The kinds of its modes in the order of Solution."""
+        command = [self.program.with_name("carillon-bank"), "info", "--json", bank]
+        done = subprocess.run(command, capture_output=True, text=True, env=measuring.make_environment())
+        if done.returncode != 0:
+            raise RunError(4, f"{self.job_file}: {done.stderr.strip()}")
+        modes = sorted(json.loads(done.stdout)["modes"], key=lambda mode: mode["corrected_frequency_hz"])
+        return tuple(mode.get("kind") or "" for mode in modes)
 
     def solve_all(self, jobs):
         """Their Solutions, as many at once as there are cores."""
@@ -86,13 +122,27 @@ def read_bank(path, job_file):
             float(bank["rigid/mass_kg"][()]),
             float(bank["rigid/volume_m3"][()]),
             job,
+            bank["mesh/triangles"][:],
+            read_sites(bank["sensitivity"], order) if "sensitivity" in bank else None,
         )
 
 
-def follow(first, second):
-    """(m) for each mode of a Solution the mode of another with its shape, by the modal assurance criterion (Allemang and Brown 1982), each
-    taken once. Vertices of different meshes are compared at equal places of the two bounding boxes. `second` needs as many modes or more.
-    """
+def read_sites(group, order):
+    """Sites; order: (m) modes of the bank in that of the Solution."""
+    place = numpy.argsort(order)
+    return Sites(
+        place[group["modes"][:]],
+        group["density"][:] * group["scale"][:],
+        group["vertex"][:],
+        group["normal"][:].astype(float),
+        group["area_m2"][:].astype(float),
+        group["doubtful"][:] > 0,
+    )
+
+
+def compare(first, second):
+    """(m, m') modal assurance criteria (Allemang and Brown 1982) of the modes of two Solutions, 1 for equal shapes. Vertices of different
+    meshes are compared at equal places of the two bounding boxes."""
     chosen = numpy.linspace(0, len(first.vertices) - 1, min(len(first.vertices), MAX_VERTICES)).astype(int)
     other = chosen
     if len(first.vertices) != len(second.vertices):
@@ -100,4 +150,10 @@ def follow(first, second):
         other = scipy.spatial.cKDTree(places[1]).query(places[0][chosen])[1]
     rows = [(s.shapes[:, at].reshape(len(s.shapes), -1)) for s, at in ((first, chosen), (second, other))]
     rows = [row / numpy.linalg.norm(row, axis=1, keepdims=True) for row in rows]
-    return scipy.optimize.linear_sum_assignment(-((rows[0] @ rows[1].T) ** 2))[1]
+    return (rows[0] @ rows[1].T) ** 2
+
+
+def follow(first, second):
+    """(m) for each mode of a Solution the mode of another with its shape, by compare(), each taken once. `second` needs as many modes or
+    more."""
+    return scipy.optimize.linear_sum_assignment(-compare(first, second))[1]
