@@ -51,15 +51,19 @@ def draw(path, before_m, after_m, title, table):
     cut = depth[triangles].max(axis=1) > 1e-4
     side = numpy.sign(normal[cut, up].sum()) if cut.any() else 1.0
     facing = normal[:, up] * side > 0.05
+    # As seen from that side, with `along` to the right: `across` points up or down.
+    plan = before.copy()
+    if side * numpy.linalg.det(numpy.eye(3)[[along, across, up]]) < 0:
+        plan[:, across] = low[across] + high[across] - plan[:, across]
     edges = {}
     for t in triangles[facing].tolist():
         for a, b in zip(t, t[1:] + t[:1]):
             edges[frozenset((a, b))] = None if frozenset((a, b)) in edges else (a, b)
-    rim = before[numpy.array([edge for edge in edges.values() if edge]).reshape(-1, 2)]
+    rim = plan[numpy.array([edge for edge in edges.values() if edge]).reshape(-1, 2)]
     add_lines(rim, along, across, low[along], top + high[across], 'stroke="#000" stroke-width="0.35"')
     levels = numpy.arange(1, int(most / step + 1e-9) + 1) * step
     for number, level in enumerate(levels):
-        lines = find_lines(before, triangles[facing & cut], depth, level)
+        lines = find_lines(plan, triangles[facing & cut], depth, level)
         colour = COLOURS[min(len(COLOURS) - 1, number * len(COLOURS) // max(len(levels), 1))]
         add_lines(lines, along, across, low[along], top + high[across], f'stroke="{colour}" stroke-width="0.25"')
         if len(lines):

@@ -189,6 +189,16 @@ class Shells(Case):
         again = self.solve(json.loads((self.folder / "out/job.json").read_text()) | {"mesh": str(self.folder / "out/body.msh")}, 8)
         self.assertLess(1200 * math.log2(again.freq_hz[1] / again.freq_hz[0]), 0.1)
 
+    def test_removal_map_of_a_plate(self):
+        """Two modes lowered by different cents, by cuts within their limit."""
+        job = PLANK | {"body": {"shape": "plate", "length_m": 0.2, "width_m": 0.15, "thickness_m": 0.006, "nodes": 4000}}
+        flat = self.solve(job)
+        wishes = ",".join(f"{hz * 2 ** (-cents / 1200):.4f}" for hz, cents in zip(flat.corrected_hz, (30, 10)))
+        done = self.tune(job, "--map", "--hz", wishes, "--modes", "mode 1,mode 2", "--most", "1mm")
+        self.assertLess(max(abs(mode["off_cents"]) for mode in done["modes"]), 0.2)
+        self.assertTrue(0 < max(done["parameters"].values()) <= 0.001)
+        self.assertGreaterEqual(min(done["parameters"].values()), 0)
+
     def test_sizes_of_a_cup_are_found_again(self):
         """A cup of other sizes has the wished frequencies; its pairs stay pairs."""
         job = CUP | {"body": CUP["body"] | {"wall_m": 0.004, "opening_angle_deg": 130, "nodes": 16000}}
