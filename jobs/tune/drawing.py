@@ -49,7 +49,7 @@ def draw(path, before_m, after_m, title, table):
     normal = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= numpy.maximum(numpy.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
     cut = depth[triangles].max(axis=1) > 1e-4
-    side = numpy.sign(normal[cut, up].sum()) if cut.any() else 1.0
+    side = numpy.sign(normal[cut, up].sum()) or 1.0  # 1 where nothing or both sides are cut
     facing = normal[:, up] * side > 0.05
     # As seen from that side, with `along` to the right: `across` points up or down.
     plan = before.copy()
@@ -59,7 +59,7 @@ def draw(path, before_m, after_m, title, table):
     for t in triangles[facing].tolist():
         for a, b in zip(t, t[1:] + t[:1]):
             edges[frozenset((a, b))] = None if frozenset((a, b)) in edges else (a, b)
-    rim = plan[numpy.array([edge for edge in edges.values() if edge]).reshape(-1, 2)]
+    rim = plan[numpy.array([edge for edge in edges.values() if edge], int).reshape(-1, 2)]
     add_lines(rim, along, across, low[along], top + high[across], 'stroke="#000" stroke-width="0.35"')
     levels = numpy.arange(1, int(most / step + 1e-9) + 1) * step
     for number, level in enumerate(levels):

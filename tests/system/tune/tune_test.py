@@ -65,7 +65,7 @@ class Case(unittest.TestCase):
         )
 
     def check_finer(self, job, result, wall_m, wishes_hz):
-        """The design on a mesh twice as fine: within half a cent and within the bars there."""
+        """The design on a mesh twice as fine: within half a cent, and within the bars that the tuning states."""
         body = shapes.make_undercut(job, 4.0, 6, "z-min", wall_m)
         fine = self.solve(body.make_job(numpy.array(result["steps"][-1]["parameters"]), self.folder), 8)
         for number, hz in enumerate(wishes_hz, 1):
@@ -73,7 +73,7 @@ class Case(unittest.TestCase):
             off = 1200 * math.log2(fine.corrected_hz[mode] / hz)
             print(f"{self.id()}: {wishes_hz[0]:.2f} x {number}: {off:+.3f} cents, bar {fine.bar_cents[mode]:.3f}")
             self.assertLess(abs(off), 0.5)
-            self.assertLess(abs(off), fine.bar_cents[mode])
+            self.assertLess(abs(off), result["modes"][number - 1]["bar_cents"])
 
 
 class Bars(Case):
