@@ -117,7 +117,7 @@ def find_splines(knots, spacing, along):
 
 def make_undercut(job, fineness, knots=6, side="z-min", wall_m=None):
     """The bar of a job, cut from one side by knots along its length. fineness: of the mesh, 1 is coarse."""
-    body = job["body"]
+    body = job.get("body", {})
     sizes = [body.get(key) for key in ("length_m", "width_m")] + [body.get("thickness_m", body.get("height_m"))]
     if body.get("shape") not in ("bar", "plate", "box") or not all(sizes):
         raise InputError('an undercut needs "body": {"shape": "bar", "length_m": ..., "width_m": ..., "thickness_m": ...}')
@@ -311,7 +311,7 @@ def read_limits(text, job):
             low, high = (float(value) for value in values.split(":"))
         except ValueError:
             raise InputError(f"--free {word!r}: give a key and its limits, like body.wall_m=0.002:0.004") from None
-        if isinstance(at, bool) or not isinstance(at, (int, float)):
+        if isinstance(at, bool) or not isinstance(at, (int, float)) or not name.endswith(("_m", "_deg")):
             raise InputError(f"--free {name}: the job has no such size of a body, like body.wall_m")
         if not 0 < low <= at <= high or low == high:
             raise InputError(f"--free {word}: the value of the job, {at:g}, is not within the limits, above 0")

@@ -1,14 +1,16 @@
 """carillon tune: removes material, or changes keys of a job, until a body has the wished frequencies."""
 import json
+import math
 import pathlib
+import resource
 import shutil
 import tempfile
-import time
 
 import numpy
 
 import drawing
 import grid
+import job_file
 import measuring
 import programs
 import shapes
@@ -71,26 +73,13 @@ def add_command(commands):
     add("--json", action="store_true", help="print the result as one JSON document")
 
 
-def read_job(path):
-    try:
-        job = json.loads(pathlib.Path(path).read_text())
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from None
-    except ValueError as error:
-        raise InputError(f"{path}: not JSON: {error}") from None
-    if not isinstance(job, dict):
-        raise InputError(f"{path}: a job is a JSON object")
-    return job
-
-
 def run(options):
     """(text, document) of the command."""
-    start = time.process_time()
     if not 0.001 <= options.cents <= 100:
         raise InputError("--cents: between 0.001 and 100")
     if options.knots is not None and not 1 <= options.knots <= 400:
         raise InputError("--knots: between 1 and 400")
-    job = read_job(options.job)
+    job = job_file.read_job(options.job)
     wall = shapes.read_length(options.wall) if options.wall else None
     tolerance = shapes.read_length(options.tolerance)
     say = (lambda text: None) if options.json else (lambda text: print(text, flush=True))
@@ -124,7 +113,7 @@ def run(options):
         else:
             search.set_wishes(targets.read_wishes(options, "" if options.map or options.free or options.outline else "bending"))
             outcome = search.tune(make_body, start_p)
-        return report(options, outcome, search.wishes, tolerance, solver, out, start)
+        return report(options, outcome, search.wishes, tolerance, solver, out)
 
 
 def read_counts(text):
@@ -138,7 +127,7 @@ def read_counts(text):
     return numbers
 
 
-def report(options, outcome, wishes, tolerance, solver, out, start):
+def report(options, outcome, wishes, tolerance, solver, out):
     last, body = outcome.last, outcome.body
     values, by_p = body.show(last.p)
     rates = outcome.jacobian / by_p
@@ -157,7 +146,7 @@ def report(options, outcome, wishes, tolerance, solver, out, start):
     }
     modes = [{"mode": name or last.solution.kinds[last.groups[k][0]]} for k, name in enumerate(names)]
     for k, mode in enumerate(modes):
-        mode |= {key: float(values[k]) for key, values in columns.items()} | {"cents_per_unit": rates[k].tolist()}
+        mode |= {key: float(column[k]) for key, column in columns.items()} | {"cents_per_unit": rates[k].tolist()}
     rows = [["mode", "before Hz", "wish Hz", "after Hz", "off before", "off", "bar", "milling", "guarantee"]]
     rows += [[mode["mode"], *(f"{mode[key]:{'+' if 'off' in key else ''}.2f}" for key in columns)] for mode in modes]
     units = numpy.where(body.is_length, 1e-4, 0.01 * values)
@@ -167,7 +156,8 @@ def report(options, outcome, wishes, tolerance, solver, out, start):
             shown = f"{1e3 * value:.3f} mm" if body.is_length[k] else f"{value:.6g}"
             depths.append([name, shown, *(f"{units[k] * row[k]:+.2f}" for row in rates)])
     table = measuring.format_table(rows)
-    cpu_s = solver.cpu_s + time.process_time() - start
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    cpu_s = sum(one.ru_utime + one.ru_stime for one in used)
     text = [
         table,
         "off, bar, milling, guarantee in cents: from the wish (of pairs: beats); of the body's true frequency; for +-"
@@ -182,6 +172,8 @@ def report(options, outcome, wishes, tolerance, solver, out, start):
     lines = table.splitlines()
     write_files(out, outcome, options, [lines[0], *lines[2:]])
     (out / "table.txt").write_text("\n".join(text) + "\n")
+    for mode in modes:  # JSON has no infinity: an unknown bar
+        mode |= {key: mode[key] if math.isfinite(mode[key]) else None for key in columns}
     document = {
         "exit_code": 0 if outcome.reached else NOT_REACHED,
         "modes": modes,
@@ -201,7 +193,9 @@ def write_files(out, outcome, options, table):
     body, p = outcome.body, outcome.last.p
     job = body.make_job(p, out) | {"bank": "again.hdf"}
     if "mesh" in job:
-        job["mesh"] = "body.msh" if (out / "body.msh").exists() else job["mesh"]
+        job["mesh"] = "body.msh"
+    if "surface" in job.get("body", {}):
+        job["body"]["surface"] = str((pathlib.Path(options.job).resolve().parent / job["body"]["surface"]).resolve())
     (out / "job.json").write_text(json.dumps(job, indent=1) + "\n")
     for ending in ("", ".resolved.json"):
         shutil.copyfile(f"{outcome.last.bank}{ending}", out / f"bank.hdf{ending}")

@@ -157,6 +157,8 @@ class Unreachable(Case):
         ):
             done = self.tune(PLANK, *words, code=2)
             self.assertIn(part, done["error"])
+        done = self.tune({"mesh": "none.msh"} | {key: PLANK[key] for key in ("material", "bank")}, "--hz", "200", code=2)
+        self.assertIn("none.msh", done["error"])
 
 
 def cast_bowl(folder, nodes=6000):
