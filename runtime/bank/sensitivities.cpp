@@ -18,6 +18,7 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::MatrixXd;
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 using Point = std::array<double, 3>;  // barycentric
 
 constexpr double kSharpDeg = 50.0;  // edges that are less sharp belong to smooth surfaces
@@ -168,6 +169,94 @@ std::vector<std::int32_t> find_sites(const Bank& bank) {
   return site;
 }
 
+/// Motion of the modes on one face at a time.
+class FaceMotion {
+ public:
+  explicit FaceMotion(Eigen::Index modes) : shape_(6, Rows(modes, 3)), by_0_(modes, 3), by_1_(modes, 3) {
+    u.resize(modes, 3);
+    strain.resize(modes, 3);
+  }
+
+  void read(const Bank& bank, const Face& face) {
+    nodes_ = face.nodes;
+    for (std::size_t n = 0; n < nodes_; ++n) {
+      place_[n] = bank.vertices_m[face.node[n]];
+      for (Eigen::Index m = 0; m < u.rows(); ++m) {
+        const Vec3 phi = bank.shape_at(face.node[n], m);
+        shape_[n].row(m) << phi[0], phi[1], phi[2];
+      }
+    }
+  }
+
+  /// False where the face has no area.
+  bool find(const QuadraturePoint& point) {
+    Vec3 t0{}, t1{};
+    u.setZero();
+    by_0_.setZero();
+    by_1_.setZero();
+    for (std::size_t n = 0; n < nodes_; ++n) {
+      t0 = t0 + point.slope[n][0] * place_[n];
+      t1 = t1 + point.slope[n][1] * place_[n];
+      u += point.value[n] * shape_[n];
+      by_0_ += point.slope[n][0] * shape_[n];
+      by_1_ += point.slope[n][1] * shape_[n];
+    }
+    const Vec3 normal = cross(t0, t1);
+    const double length = norm(t0);
+    size = norm(normal);
+    if (!(size > 0.0)) return false;
+    const Vec3 e0 = (1.0 / length) * t0, e2 = (1.0 / size) * normal, e1 = cross(e2, e0);
+    for (int k = 0; k < 3; ++k) axes.row(k) << e0[k], e1[k], e2[k];
+    // Derivatives along e0 and e1: t0 = length e0, t1 = along e0 + across e1.
+    const double along = dot(t1, e0), across = dot(t1, e1);
+    by_1_ = (by_1_ - along / length * by_0_) / across;
+    by_0_ /= length;
+    strain.col(0) = by_0_ * axes.col(0);
+    strain.col(1) = by_1_ * axes.col(1);
+    strain.col(2) = by_0_ * axes.col(1) + by_1_ * axes.col(0);
+    return true;
+  }
+
+  // At the point found last: displacements (m, 3); strains 11, 22 and 2 12 (m, 3) along the columns 0 and 1 of `axes`, column 2 is the
+  // normal; area per area of the barycentric coordinates.
+  Rows u, strain;
+  Matrix3d axes;
+  double size = 0.0;
+
+ private:
+  std::size_t nodes_ = 0;
+  std::array<Vec3, 6> place_{};
+  std::vector<Rows> shape_;
+  Rows by_0_, by_1_;
+};
+
+/// Sites without densities, normals and areas.
+Sensitivities make_sites(const Bank& bank, const std::vector<std::int32_t>& site_of_corner, const std::vector<std::uint8_t>& doubtful) {
+  Sensitivities made;
+  const std::size_t sites = site_of_corner.empty() ? 0 : 1 + *std::max_element(site_of_corner.begin(), site_of_corner.end());
+  made.vertex.resize(sites);
+  made.normal.resize(sites);
+  made.area_m2.resize(sites);
+  made.doubtful.resize(sites);
+  for (std::size_t i = 0; i < site_of_corner.size(); ++i) {
+    const std::int32_t v = bank.triangles[i / 3][i % 3];
+    made.vertex[site_of_corner[i]] = v;
+    made.doubtful[site_of_corner[i]] = doubtful[v];
+  }
+  return made;
+}
+
+/// Sets scale and density (S, C) from (C, S).
+void round_densities(const MatrixXd& density, Sensitivities& result) {
+  const std::size_t columns = result.modes.size(), sites = result.site_count();
+  result.density.resize(sites * columns);
+  for (std::size_t c = 0; c < columns; ++c) {
+    const auto row = density.row(static_cast<Eigen::Index>(c));
+    result.scale.push_back(calc_shape_scale(row.cwiseAbs().maxCoeff()));
+    for (std::size_t s = 0; s < sites; ++s) result.density[s * columns + c] = find_step(row[static_cast<Eigen::Index>(s)], result.scale[c]);
+  }
+}
+
 std::vector<std::array<std::int32_t, 2>> find_columns(const Bank& bank, std::size_t count) {
   std::vector<std::array<std::int32_t, 2>> columns;
   for (std::size_t i = 0; i < count; ++i) columns.push_back({static_cast<std::int32_t>(i), static_cast<std::int32_t>(i)});
@@ -181,95 +270,46 @@ std::vector<std::array<std::int32_t, 2>> find_columns(const Bank& bank, std::siz
 
 Sensitivities calc_sensitivities(const Bank& bank, const material::Elasticity& elasticity_pa, double density_kg_m3, std::size_t count,
                                  std::span<const std::uint8_t> fixed) {
-  count = std::min(count, bank.mode_count());
-  Sensitivities result;
-  result.count = count;
-  result.modes = find_columns(bank, count);
+  constexpr double kCentPerMm = 600.0 / std::numbers::ln2 * 1e-3;
   const std::vector<Face> faces = find_faces(bank);
   const std::vector<std::int32_t> site_of_corner = find_sites(bank);
-  const std::size_t sites = site_of_corner.empty() ? 0 : 1 + *std::max_element(site_of_corner.begin(), site_of_corner.end());
-  const std::vector<std::uint8_t> doubtful = find_doubtful(bank, faces, fixed);
-  result.vertex.resize(sites);
-  result.normal.resize(sites);
-  result.area_m2.resize(sites);
-  result.doubtful.resize(sites);
-  for (std::size_t i = 0; i < site_of_corner.size(); ++i) {
-    const std::int32_t v = bank.triangles[i / 3][i % 3];
-    result.vertex[site_of_corner[i]] = v;
-    result.doubtful[site_of_corner[i]] = doubtful[v];
-  }
-  const std::size_t columns = result.modes.size();
-  if (columns == 0 || faces.empty()) return result;
+  Sensitivities result = make_sites(bank, site_of_corner, find_doubtful(bank, faces, fixed));
+  result.count = std::min(count, bank.mode_count());
+  result.modes = find_columns(bank, result.count);
+  if (result.modes.empty() || faces.empty()) return result;
   const std::vector<QuadraturePoint> rule = make_rule(faces.front().nodes);
-  MatrixXd density = MatrixXd::Zero(static_cast<Eigen::Index>(columns), static_cast<Eigen::Index>(sites));
-  std::vector<Vec3> normals(sites);  // times areas
-  const auto modes = static_cast<Eigen::Index>(count);
-  using Rows = Eigen::Matrix<double, Eigen::Dynamic, 3>;
-  std::vector<Rows> shape(6, Rows(modes, 3));
-  Rows u(modes, 3), by_0(modes, 3), by_1(modes, 3), strain(modes, 3), stress(modes, 3);
-  Eigen::VectorXd found(static_cast<Eigen::Index>(columns));
+  const auto columns = static_cast<Eigen::Index>(result.modes.size()), sites = static_cast<Eigen::Index>(result.site_count());
+  MatrixXd density = MatrixXd::Zero(columns, sites);
+  std::vector<Vec3> normals(result.site_count());  // times areas
+  FaceMotion motion(static_cast<Eigen::Index>(result.count));
+  Rows stress;
+  Eigen::VectorXd found(columns);
   for (std::size_t f = 0; f < faces.size(); ++f) {
-    const Face& face = faces[f];
-    for (std::size_t n = 0; n < face.nodes; ++n)
-      for (Eigen::Index m = 0; m < modes; ++m) {
-        const Vec3 phi = bank.shape_at(face.node[n], m);
-        shape[n].row(m) << phi[0], phi[1], phi[2];
-      }
+    motion.read(bank, faces[f]);
     for (std::size_t p = 0; p < rule.size(); ++p) {
-      const QuadraturePoint& point = rule[p];
-      Vec3 t0{}, t1{};
-      u.setZero();
-      by_0.setZero();
-      by_1.setZero();
-      for (std::size_t n = 0; n < face.nodes; ++n) {
-        const Vec3& place = bank.vertices_m[face.node[n]];
-        t0 = t0 + point.slope[n][0] * place;
-        t1 = t1 + point.slope[n][1] * place;
-        u += point.value[n] * shape[n];
-        by_0 += point.slope[n][0] * shape[n];
-        by_1 += point.slope[n][1] * shape[n];
-      }
-      const Vec3 normal = cross(t0, t1);
-      const double size = norm(normal), length = norm(t0);
-      if (!(size > 0.0)) continue;
-      const Vec3 e0 = (1.0 / length) * t0, e2 = (1.0 / size) * normal, e1 = cross(e2, e0);
-      Matrix3d axes;
-      for (int k = 0; k < 3; ++k) axes.row(k) << e0[k], e1[k], e2[k];
-      // Derivatives along e0 and e1: t0 = length e0, t1 = along e0 + across e1.
-      const double along = dot(t1, e0), across = dot(t1, e1);
-      by_1 = (by_1 - along / length * by_0) / across;
-      by_0 /= length;
-      strain.col(0) = by_0 * axes.col(0);
-      strain.col(1) = by_1 * axes.col(1);
-      strain.col(2) = by_0 * axes.col(1) + by_1 * axes.col(0);
-      stress.noalias() = strain * calc_plane_stiffness(elasticity_pa, axes);
-      for (std::size_t c = 0; c < columns; ++c) {
-        const auto [i, j] = result.modes[c];
+      if (!motion.find(rule[p])) continue;
+      stress.noalias() = motion.strain * calc_plane_stiffness(elasticity_pa, motion.axes);
+      for (Eigen::Index c = 0; c < columns; ++c) {
+        const auto [i, j] = result.modes[static_cast<std::size_t>(c)];
         const double lambda = 0.5 * (bank.eigenvalue_rad2_s2[i] + bank.eigenvalue_rad2_s2[j]);
-        found[static_cast<Eigen::Index>(c)] = (lambda * density_kg_m3 * u.row(i).dot(u.row(j)) - stress.row(i).dot(strain.row(j))) / lambda;
+        found[c] = density_kg_m3 * motion.u.row(i).dot(motion.u.row(j)) - stress.row(i).dot(motion.strain.row(j)) / lambda;
       }
-      constexpr double kCentPerMm = 600.0 / std::numbers::ln2 * 1e-3;
       for (std::size_t k = 0; k < 3; ++k) {
         const std::int32_t site = site_of_corner[f * rule.size() + p / 3 * 3 + k];  // three points a triangle
-        const double share = point.weight * size * point.hat[k];
-        normals[site] = normals[site] + share * e2;
+        const double share = rule[p].weight * motion.size * rule[p].hat[k];
+        normals[site] = normals[site] + share * Vec3{motion.axes(0, 2), motion.axes(1, 2), motion.axes(2, 2)};
         density.col(site) += kCentPerMm * share * found;
         result.area_m2[site] += static_cast<float>(share);
       }
     }
   }
-  for (std::size_t s = 0; s < sites; ++s) {
-    if (!(result.area_m2[s] > 0.0F)) continue;
-    density.col(static_cast<Eigen::Index>(s)) /= result.area_m2[s];
-    const Vec3 normal = normalise(normals[s]);
-    for (std::size_t k = 0; k < 3; ++k) result.normal[s][k] = static_cast<float>(normal[k]);
+  for (Eigen::Index site = 0; site < sites; ++site) {
+    if (!(result.area_m2[site] > 0.0F)) continue;
+    density.col(site) /= result.area_m2[site];
+    const Vec3 normal = normalise(normals[site]);
+    for (std::size_t k = 0; k < 3; ++k) result.normal[site][k] = static_cast<float>(normal[k]);
   }
-  result.density.resize(sites * columns);
-  for (std::size_t c = 0; c < columns; ++c) {
-    const auto row = density.row(static_cast<Eigen::Index>(c));
-    result.scale.push_back(calc_shape_scale(row.cwiseAbs().maxCoeff()));
-    for (std::size_t s = 0; s < sites; ++s) result.density[s * columns + c] = find_step(row[static_cast<Eigen::Index>(s)], result.scale[c]);
-  }
+  round_densities(density, result);
   return result;
 }
 

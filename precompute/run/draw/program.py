@@ -79,7 +79,7 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message}; see {self.prog} --help")
 
 
-def run(version):
+def make_parser(version):
     parser = Parser(prog="carillon-draw", description="Draws mode banks, simulated scenes and simulations.")
     parser.add_argument("--version", action="version", version=f"carillon-draw {version}")
     commands = parser.add_subparsers(
@@ -110,7 +110,11 @@ def run(version):
     motion_words.add_argument("--frames", type=pathlib.Path, metavar="DIR", help="write all frames to this folder, 00001.png and so on")
     for command in (modes_words, sensitivity_words, directivity_words, scene_words, motion_words):
         command.add_argument("--result", type=pathlib.Path, metavar="FILE", help="write the outcome to this file, a JSON object")
-    arguments = parser.parse_args()
+    return parser
+
+
+def run(version):
+    arguments = make_parser(version).parse_args()
 
     if arguments.output is not None:
         check_output(arguments.output)

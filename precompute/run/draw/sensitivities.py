@@ -2,7 +2,6 @@
 import numpy
 
 import modes
-import picture
 from picture import vtk
 
 
