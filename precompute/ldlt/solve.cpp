@@ -10,7 +10,6 @@
 #include <list>
 #include <map>
 #include <numeric>
-#include <ranges>
 
 #include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/numeric.hpp"
@@ -278,8 +277,9 @@ class Solver {
       std::vector<double*>& in = solutions[k];
       if (home == front.place) {
         const Ints slots = list_slots(front, k);
-        for (const int place : std::views::reverse(front.row_places[k]))  // the nearest comes last
-          receive(front.map.rank(place), find_tag(front.id, kAlongRow), slots, Arrival::kIsAdded);
+        const std::vector<int>& row = front.row_places[k];
+        for (auto place = row.rbegin(); place != row.rend(); ++place)  // the nearest comes last
+          receive(front.map.rank(*place), find_tag(front.id, kAlongRow), slots, Arrival::kIsAdded);
         for (const Block& block : blocks_) {
           double* own = find_row(block, slots.front());
           const std::uint8_t* order = numbers_.order.data() + panel.pivots;
@@ -343,8 +343,9 @@ class Solver {
         if (!sums.empty()) send_block(front.map.rank(front.map.owner(k, k)), find_tag(front.id, kAlongColumn), n, sums);
         continue;
       }
-      for (const int place : std::views::reverse(front.column_places[k]))
-        add_block(front.map.rank(place), find_tag(front.id, kAlongColumn), n, sums);
+      const std::vector<int>& column = front.column_places[k];
+      for (auto place = column.rbegin(); place != column.rend(); ++place)
+        add_block(front.map.rank(*place), find_tag(front.id, kAlongColumn), n, sums);
       alignas(64) double solution[kMaxBlock * 16];
       const Ints slots = list_slots(front, k);
       const double* triangle = numbers_.panels.data() + panel.triangle;

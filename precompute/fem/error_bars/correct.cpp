@@ -180,7 +180,7 @@ Corrections calc_corrections(const Level& level, std::span<const Level> coarser)
   const std::vector<ErrorParts> parts = share_parts(level);
   Verdict verdict{{}, std::vector<double>(parts.size(), 0.0)};
   for (const ErrorParts& mode : parts) verdict.correction.push_back(find_correction(mode, level));
-  const Corrections alone = correct(level, parts, verdict);
+  Corrections alone = correct(level, parts, verdict);
   if (coarser.empty()) return alone;
   Corrections corrections = correct(level, parts, compare(level, alone, coarser));
   if (corrections.facet_cents.empty() && !is_too_short(level))  // facet_cents are on top of the level's own bars
