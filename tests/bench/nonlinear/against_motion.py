@@ -84,6 +84,7 @@ def make_bank(options, plan):
         "fixed": make_hinge(),
         "band_hz": [20, 9000],
         "nonlinear": {"modes": plan["modes"], "below_hz": 5000},
+        "shapes": "exact",
         "bank": "sheet.hdf",
     }
     (options.out / "sheet.json").write_text(json.dumps(job, indent=1) + "\n")

@@ -75,7 +75,7 @@ def find_soundings(lab, bodies):
 
 def solve(lab, soundings):
     """{name: path of the bank}; each is solved once."""
-    solves = lab.measure([Case(f"{one.name}, all that is heard", one.job) for one in soundings], repeats=1)
+    solves = lab.measure([Case(f"{one.name}, all that is heard", one.job | {"shapes": "exact"}) for one in soundings], repeats=1)
     return {one.name: solves[f"{one.name}, all that is heard"].bank for one in soundings}
 
 

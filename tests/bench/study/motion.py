@@ -145,6 +145,7 @@ def couple_disc(lab):
             "fixed": ["edge"],
             "band_hz": [20, 3000],
             "max_modes": 40,
+            "shapes": "exact",
             "nonlinear": {"modes": 12, "below_hz": 3000, "energy_error": error},
         }
         cases[nodes, error] = Case(f"clamped disc, {nodes} nodes, energy_error {error:g}", job)
