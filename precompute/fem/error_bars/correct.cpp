@@ -164,7 +164,7 @@ Verdict compare(const Level& level, const Corrections& corrections, std::span<co
   return verdict;
 }
 
-/// Shortens bars to what those of a coarser mesh leave, k-th against k-th.
+/// Limits each interval to the bar of the k-th frequency of a coarser mesh.
 void keep_within(const Corrections& coarser, Corrections& corrections) {
   const std::vector<std::size_t> order = base::find_sort_order(corrections.lambda), before = base::find_sort_order(coarser.lambda);
   for (std::size_t k = 0; k < std::min(order.size(), before.size()); ++k) {

@@ -36,8 +36,8 @@ namespace {
 constexpr double kRidgeT4 = 1e-3, kRidgeT10 = 1e-2;  // from 1e-4 ... 1: smallest scatter on the training bodies of docs/error-bars.md
 // Depth of the layer relative to the size of an element at the surface: smallest scatter on strips and training bodies.
 constexpr double kLayer = 0.125;
-// Of the estimate of T10 at inward edges. With all elements around an edge of 270 degrees halved again and again, lambda falls by 0.66 of
-// what the estimates fall by (0.6 in walls of one layer), three quarters of it in the elements that touch the edge.
+// Of the estimate of T10 at inward edges. Ratio of true to estimated error at 270 degrees: 0.66, in walls of one layer 0.6; three quarters
+// of the estimate lie in the elements at the edge.
 constexpr float kInwardShare = 0.5F;
 constexpr double kFlatness = 1e-10;  // tolerance for flat elements in the terms without ridge
 
@@ -411,7 +411,8 @@ Recovery make_recovery(const comm::Communicator& comm, const mesh::LocalMesh& lo
   elements.materials = static_cast<int>(solids.size());
   elements.count = local.tet_count();
   const Surface surface = find_surface(comm, local);
-  std::array<double, 3> size{0.0, static_cast<double>(elements.count), 0.0};  // volume, elements, single-layer elements
+  // Volume, elements, single-layer elements, doubtful facets, vertices at rims of fixed faces.
+  std::array<double, 5> size{0.0, static_cast<double>(elements.count), 0.0, static_cast<double>(surface.doubts.size()), 0.0};
   comm.agree([&] {
     recovery.vertex_node.resize(*std::max_element(vertex_place.begin(), vertex_place.end()) + 1);
     for (std::size_t n = 0; n < place.size(); ++n)
@@ -419,11 +420,12 @@ Recovery make_recovery(const comm::Communicator& comm, const mesh::LocalMesh& lo
     fill_elements(local, solids, material_of_tet, surface, recovery);
     for (const float volume : elements.volume) size[0] += volume;
     size[2] = count_one_layer(local, surface.is_outer);
+    size[4] = static_cast<double>(std::ranges::count_if(surface.singular, [](char s) { return (s & kRim) != 0; }));
   });
   comm.sum(size);
   recovery.one_layer = size[2] / size[1];
-  recovery.is_guessed = !comm.all(surface.doubts.empty());
-  recovery.has_rims = !comm.all(std::none_of(surface.singular.begin(), surface.singular.end(), [](char s) { return (s & kRim) != 0; }));
+  recovery.is_guessed = size[3] > 0.0;
+  recovery.has_rims = size[4] > 0.0;
 
   std::unique_ptr<Patches> patches;
   comm.agree([&] {
