@@ -4,6 +4,7 @@
 usage: sensitivity_test.py BIN_DIR
 """
 import json
+import math
 import pathlib
 import struct
 import subprocess
@@ -14,8 +15,20 @@ import unittest
 import h5py
 import numpy
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+import surfaces
+
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 STEEL = {"young_modulus_pa": 2e11, "poisson_ratio": 0.29, "density_kg_m3": 7850, "damping": {"internal_friction": {"tan_phi": 2e-4}}}
+WOOD = {
+    "orthotropic": {
+        "young_modulus_pa": [11e9, 0.9e9, 0.5e9],
+        "shear_modulus_pa": [0.7e9, 0.04e9, 0.75e9],
+        "poisson_ratio": [0.4, 0.45, 0.4],
+    },
+    "density_kg_m3": 430,
+    "damping": {"internal_friction": {"tan_phi": 8e-3}},
+}
 BAR = {"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.012, "nodes": 4000}
 
 
@@ -25,15 +38,16 @@ class Sensitivity(unittest.TestCase):
         cls.scratch = tempfile.TemporaryDirectory(prefix="carillon-sensitivity-")
         cls.folder = pathlib.Path(cls.scratch.name)
         cls.solve("bar", sensitivities=20)
+        cls.solve("wood", BAR, WOOD, sensitivities=8, band_hz=[20, 6000])
 
     @classmethod
     def tearDownClass(cls):
         cls.scratch.cleanup()
 
     @classmethod
-    def solve(cls, name, body=None, material=None, **more):
+    def solve(cls, name, body=BAR, material=STEEL, **more):
         """Frequencies of the mesh."""
-        job = {"body": BAR | (body or {}), "material": material or STEEL, "band_hz": [20, 15000], "bank": f"{name}.hdf"} | more
+        job = {"body": body, "material": material, "band_hz": [20, 15000], "bank": f"{name}.hdf"} | more
         (cls.folder / f"{name}.json").write_text(json.dumps(job))
         subprocess.run([BIN / "carillon-precompute", "-q", f"{name}.json"], cwd=cls.folder, check=True, stderr=subprocess.DEVNULL)
         with h5py.File(cls.folder / f"{name}.hdf") as bank:
@@ -56,31 +70,49 @@ class Sensitivity(unittest.TestCase):
 
     def test_constants_and_thickness_are_those_of_new_solves(self):
         modes = self.ask("bar.hdf")
-        thick, thin = (self.solve("moved", {"thickness_m": 0.012 * share}) for share in (1.005, 0.995))
+        thick, thin = (self.solve("moved", BAR | {"thickness_m": 0.012 * share}) for share in (1.005, 0.995))
         self.compare([mode["thickness"] for mode in modes], thick[: len(modes)], thin[: len(modes)], 0.005)
         high, low = (self.solve("moved", material=STEEL | {"poisson_ratio": nu}) for nu in (0.295, 0.285))
         self.compare([mode["poisson_ratio"] for mode in modes], high[: len(modes)], low[: len(modes)], 0.005, 1e-3, 1e-2)
         for mode in modes:
             self.assertEqual((mode["young_modulus"], mode["density"], mode["size"]), (0.5, -0.5, -1.0))
 
+    def test_moved_and_turned_bodies_keep_their_frequencies_and_enlarged_ones_fall(self):
+        # d ln f is 0 for a translation and a rotation of the surface and -1 per d ln size, for any body: here random hexahedra.
+        for seed, material, bound in ((1, STEEL, 0.02), (2, STEEL, 0.02), (3, WOOD, 0.06)):
+            place, change = self.read_motions(seed, material)
+            size = numpy.ptp(place, axis=0).max()
+            numpy.testing.assert_allclose(change(place), -1.0, atol=bound)
+            for axis in numpy.eye(3):
+                numpy.testing.assert_allclose(change(size * axis), 0.0, atol=bound)
+                if material is STEEL:  # turning the surface of wood turns it against the grain
+                    numpy.testing.assert_allclose(change(numpy.cross(axis, place)), 0.0, atol=bound)
+
+    def read_motions(self, seed, material):
+        """Sites (S, 3) [m] about their mean of a random convex hexahedron; function from motions of the sites [m] to changes of ln f."""
+        random = numpy.random.default_rng(seed)
+        points, triangles = surfaces.make_box(0.1, 0.06, 0.03)
+        points = points @ (numpy.eye(3) + random.uniform(-0.3, 0.3, (3, 3)))
+        points /= 1.0 + (points @ random.uniform(-3.0, 3.0, 3))[:, None]  # a projection keeps planes
+        (self.folder / "random.off").write_text(surfaces.format_off([tuple(point) for point in points.tolist()], triangles))
+        body = {"surface": "random.off", "facets": True, "nodes": 10000}
+        self.solve("random", body, material, sensitivities=10, shapes="exact", max_modes=10, band_hz=[20, 60000])
+        with h5py.File(self.folder / "random.hdf") as bank:
+            group = bank["sensitivity"]
+            place = bank["mesh/vertices"][:][group["vertex"][:]]
+            inward = -group["normal"][:] * group["area_m2"][:][:, None]
+            density = group["density"][:, : len(group["by_parameter"])] * group["scale"][: len(group["by_parameter"])]
+        self.assertEqual(density.shape[1], 10)
+        return place - place.mean(axis=0), lambda motion: math.log(2) / 1200 * 1e3 * density.T @ (inward * motion).sum(axis=1)
+
     def test_moduli_of_wood_are_those_of_new_solves(self):
-        wood = {
-            "orthotropic": {
-                "young_modulus_pa": [11e9, 0.9e9, 0.5e9],
-                "shear_modulus_pa": [0.7e9, 0.04e9, 0.75e9],
-                "poisson_ratio": [0.4, 0.45, 0.4],
-            },
-            "density_kg_m3": 430,
-            "damping": {"internal_friction": {"tan_phi": 8e-3}},
-        }
-        self.solve("wood", material=wood, sensitivities=8, band_hz=[20, 6000])
         modes = self.ask("wood.hdf")
         for key, place, name in (("young_modulus_pa", 0, "young_modulus_pa.1"), ("shear_modulus_pa", 0, "shear_modulus_pa.12")):
             ends = []
             for share in (1.01, 0.99):
-                values = list(wood["orthotropic"][key])
+                values = list(WOOD["orthotropic"][key])
                 values[place] *= share
-                changed = wood | {"orthotropic": wood["orthotropic"] | {key: values}}
+                changed = WOOD | {"orthotropic": WOOD["orthotropic"] | {key: values}}
                 ends.append(self.solve("moved", material=changed, band_hz=[20, 6000])[: len(modes)])
             self.compare([mode[name] for mode in modes], *ends, 0.01, 1e-3, 1e-2)
 
