@@ -1,5 +1,5 @@
 # carillon_add_python_program(NAME main.py module...): a zip archive of Python modules and data, executable by Python; installed.
-find_program(CARILLON_STUDY_PYTHON NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
+find_program(CARILLON_SYSTEM_PYTHON NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
 function(carillon_add_python_program name main)
   set(program ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/${name})
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/modules)
@@ -13,7 +13,7 @@ function(carillon_add_python_program name main)
     COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${folder}
     COMMAND ${CMAKE_COMMAND} -E copy_if_different ${sources} ${folder}
     COMMAND ${CMAKE_COMMAND} -DINPUT=${main} -DVERSION_TEXT=${version_text} -DOUTPUT=${folder}/__main__.py -P ${stamp}
-    COMMAND ${CARILLON_STUDY_PYTHON} -m zipapp ${folder} --python /usr/bin/python3 --output ${program}
+    COMMAND ${CARILLON_SYSTEM_PYTHON} -m zipapp ${folder} --python /usr/bin/python3 --output ${program}
     COMMAND chmod 755 ${program}
     DEPENDS ${main} ${sources} ${version_text} ${stamp} carillon_git_id
     COMMENT "Packing ${name}")

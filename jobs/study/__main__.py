@@ -9,7 +9,6 @@ Exit codes: 0 done, 2 bad input, 3 the work has grown, 4 system error.
 import argparse
 import contextlib
 import json
-import signal
 import sys
 
 import advise
@@ -17,7 +16,7 @@ import programs
 import report
 import scaling
 import work
-from errors import InputError, Parser, RunError, printable
+from errors import InputError, Parser
 
 VERSION = "unknown"  # set by the build
 
@@ -111,26 +110,5 @@ def run_study(options):
     return made
 
 
-def main():
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    try:
-        programs.leave_run("study")
-        return run(sys.argv[1:])
-    except InputError as error:
-        code, text = 2, error
-    except work.HasGrown as error:
-        code, text = 3, error
-    except RunError as error:
-        code, text = error.code, error
-    except OSError as error:
-        code, text = 4, error
-    except KeyboardInterrupt:
-        return 130
-    if "--json" in sys.argv[1:]:
-        print(json.dumps({"error": str(text), "exit_code": code}, indent=2))
-    print(f"carillon-study: error: {printable(text)}", file=sys.stderr)
-    return code
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(programs.run_main("carillon-study", run, "study"))

@@ -1,12 +1,14 @@
 """Programs started by a study: in a given folder, next to this program, or in PATH."""
 import argparse
+import json
 import math
 import os
 import pathlib
 import shutil
+import signal
 import sys
 
-from errors import InputError
+from errors import InputError, RunError, printable
 
 
 def read_seconds(text):
@@ -42,3 +44,23 @@ def find_program(given, name="carillon-precompute"):
 def find_all(given, names):
     """{name: path}. InputError for the first missing program."""
     return {name: find_program(given, name) for name in sorted(set(names))}
+
+
+def run_main(name, run, *words):
+    """Exit code of run(arguments) of the program `name`; errors are one line, with --json also a document. words: as leave_run()."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    try:
+        leave_run(*words)
+        return run(sys.argv[1:])
+    except InputError as error:
+        code, text = 2, error
+    except RunError as error:
+        code, text = error.code, error
+    except OSError as error:
+        code, text = 4, error
+    except KeyboardInterrupt:
+        return 130
+    if "--json" in sys.argv[1:]:
+        print(json.dumps({"error": str(text), "exit_code": code}, indent=2))
+    print(f"{name}: error: {printable(text)}", file=sys.stderr)
+    return code

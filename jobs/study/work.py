@@ -4,15 +4,16 @@ import os
 import pathlib
 
 import job_file
-from errors import InputError
+from errors import InputError, RunError
 
 QUANTITIES = ("flops", "messages", "bytes", "collectives", "collective_bytes")
 MAX_GROWTH = 0.05
 FORMAT = 1
 
 
-class HasGrown(Exception):
-    pass
+class HasGrown(RunError):
+    def __init__(self, text):
+        super().__init__(3, text)
 
 
 def collect(study):

@@ -9,7 +9,6 @@ Exit codes: 0 done, 2 bad input, 3 a solve failed, 4 system error, 5 tuned as fa
 import argparse
 import json
 import os
-import signal
 import sys
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: threads gain nothing on matrices of this size
@@ -22,7 +21,7 @@ except ImportError as error:
     print(f"carillon-tune: error: {error}; install python3-numpy, python3-scipy and python3-h5py", file=sys.stderr)
     sys.exit(4)
 import programs
-from errors import InputError, Parser, RunError, printable
+from errors import Parser
 
 VERSION = "unknown"  # set by the build
 
@@ -44,24 +43,5 @@ def run(arguments):
     return document.get("exit_code", 0)
 
 
-def main():
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    try:
-        programs.leave_run()
-        return run(sys.argv[1:])
-    except InputError as error:
-        code, text = 2, error
-    except RunError as error:
-        code, text = error.code, error
-    except OSError as error:
-        code, text = 4, error
-    except KeyboardInterrupt:
-        return 130
-    if "--json" in sys.argv[1:]:
-        print(json.dumps({"error": str(text), "exit_code": code}, indent=2))
-    print(f"carillon-tune: error: {printable(text)}", file=sys.stderr)
-    return code
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(programs.run_main("carillon-tune", run))

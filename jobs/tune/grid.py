@@ -71,6 +71,11 @@ def spread(nodes, tets, fixed, values):
     return result
 
 
+def fade(share):
+    """Depth of a spot at a share of its radius, over that in its middle."""
+    return numpy.where(share < 1, (1 - numpy.minimum(share, 1) ** 2) ** 2, 0.0)
+
+
 def write_msh(path, nodes, tets):
     with open(path, "w") as file:
         file.write(f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{len(nodes)}\n")

@@ -1,11 +1,9 @@
 """carillon match: a recording or a list of peaks to a material with uncertainties."""
-import argparse
 import csv
 import dataclasses
 import json
 import math
 import pathlib
-import re
 
 import numpy
 
@@ -18,27 +16,10 @@ import programs
 import solver
 import sound
 from errors import InputError
+from quantities import LENGTH_UNITS, MASS_UNITS, read_quantity
 
 COLUMNS = {"hz": True, "sd_hz": False, "t60_s": False, "sd_t60_s": False}  # is it required
 T60_DECAY = math.log(1000.0)
-MASS_UNITS = {"kg": 1.0, "g": 1e-3}
-LENGTH_UNITS = {"mm": 1e-3, "um": 1e-6, "m": 1.0}
-
-
-def read_quantity(units):
-    """Type of an option: a number with one of the units, in SI."""
-
-    def read(text):
-        match = re.fullmatch(r"([0-9.]+(?:e-?[0-9]+)?)\s*([a-z]+)", text)
-        try:
-            value = float(match[1]) * units[match[2]]
-        except (TypeError, KeyError, ValueError):
-            value = 0.0
-        if not (math.isfinite(value) and value > 0):
-            raise argparse.ArgumentTypeError(f"{text!r}: give a number above 0 with its unit, {' or '.join(units)}, as 0.2{[*units][0]}")
-        return value
-
-    return read
 
 
 def add_command(commands):

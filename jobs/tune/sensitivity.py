@@ -12,9 +12,12 @@ import h5py
 import numpy
 import scipy.spatial
 
+import grid
 import programs
+import solver
 from errors import InputError
-from match import LENGTH_UNITS, read_quantity
+from quantities import LENGTH_UNITS, read_quantity
+from sites import find_sites
 
 SAME_SIDE = 0.5  # cosine of the largest angle between the normals of a spot
 
@@ -68,13 +71,9 @@ class Map:
             if "sensitivity" not in bank:
                 raise InputError(f'{path}: has no sensitivities; compute it again with "sensitivities": 30 in its job')
             group = bank["sensitivity"]
-            self.modes = group["modes"][:]
-            self.density = group["density"][:] * group["scale"][:]  # (S, C) cent / (mm m^2)
-            self.normal, self.area_m2 = group["normal"][:].astype(float), group["area_m2"][:].astype(float)
-            self.doubtful = group["doubtful"][:] != 0
-            self.vertex = group["vertex"][:]
-            self.parameters = json.loads(group["parameters"][()].rstrip(b"\0") or "[]")
             self.by_parameter = group["by_parameter"][:]
+            self.sites = solver.read_sites(group, numpy.arange(len(bank["modes/eigenvalue"])))
+            self.parameters = json.loads(group["parameters"][()].rstrip(b"\0") or "[]")
             self.vertices, self.triangles = bank["mesh/vertices"][:], bank["mesh/triangles"][:]
             self.poisson_ratio = float(bank["material/poisson_ratio"][()])
             job = json.loads(bank["provenance"][()].rstrip(b"\0"))
@@ -82,7 +81,7 @@ class Map:
             job = job["of"]
         body = job.get("body", {})
         self.thickness_m = body.get("wall_m", body.get("thickness_m"))
-        self.place = self.vertices[self.vertex]
+        self.place = self.vertices[self.sites.vertex]
         self.count = len(self.by_parameter)
         self.freq_hz = numpy.array([float(row["heard_frequency_hz"]) for row in rows])[: self.count]
         self.mesh_hz = numpy.array([float(row["frequency_hz"]) for row in rows])[: self.count]
@@ -90,7 +89,7 @@ class Map:
 
     def calc_changes(self, depth_m):
         """(n) cents, to first order; of modes within 1 % by the eigenvalues of their matrix."""
-        entry = self.density.T @ (self.area_m2 * depth_m * 1e3)
+        entry = self.sites.density.T @ (self.sites.area_m2 * depth_m * 1e3)
         changes = entry[: self.count].copy()
         cents = 1200 * numpy.log2(self.mesh_hz / self.mesh_hz[0])
         first = 0
@@ -99,7 +98,7 @@ class Map:
             while last < self.count and self.mesh_hz[last] < 1.01 * self.mesh_hz[last - 1]:
                 last += 1
             matrix = numpy.diag(cents[first:last])
-            for (i, j), value in zip(self.modes, entry):
+            for (i, j), value in zip(self.sites.columns, entry):
                 if first <= i and j < last:
                     matrix[i - first, j - first] += value
                     matrix[j - first, i - first] = matrix[i - first, j - first]
@@ -113,16 +112,22 @@ class Map:
         if "poisson_ratio" in self.parameters:  # nu = E / 2 G - 1
             by_nu = self.by_parameter[:, self.parameters.index("poisson_ratio")]
             found.insert(2, ("shear_modulus", -(1 + self.poisson_ratio) * by_nu))
-        if self.thickness_m:
-            found.append(("thickness", self.calc_by_thickness()))
+        is_face = self.find_faces()
+        if is_face.any():
+            found.append(("thickness", self.calc_by_thickness(is_face)))
         return found
 
-    def calc_by_thickness(self):
-        """(n) d ln f / d ln thickness, half of it on each side: of sites with another side at that distance, not of rims."""
-        tree = scipy.spatial.cKDTree(self.place)
-        distance, other = tree.query(self.place - self.thickness_m * self.normal, k=min(4, len(self.place)))  # an edge has several sites
-        is_opposite = (self.normal[:, None] * self.normal[other]).sum(axis=2) < -0.8
-        is_face = ((distance < 0.35 * self.thickness_m) & is_opposite).any(axis=1)
+    def find_faces(self):
+        """(S) sites with another side at the distance of the job's thickness; not those of rims."""
+        if not self.thickness_m:
+            return numpy.zeros(len(self.place), bool)
+        inside = self.place - self.thickness_m * self.sites.normal
+        distance, other = scipy.spatial.cKDTree(self.place).query(inside, k=min(4, len(self.place)))  # an edge has several sites
+        is_opposite = (self.sites.normal[:, None] * self.sites.normal[other]).sum(axis=2) < -0.8
+        return ((distance < 0.35 * self.thickness_m) & is_opposite).any(axis=1)
+
+    def calc_by_thickness(self, is_face):
+        """(n) d ln f / d ln thickness, half of it on each side."""
         share = 1e-4
         depth = numpy.where(is_face, 0.5 * share * self.thickness_m, 0.0)
         return -self.calc_changes(depth) * math.log(2) / 1200 / share
@@ -131,22 +136,8 @@ class Map:
         """Depth (S) of a spot around the nearest site, on its side of the surface."""
         nearest = numpy.linalg.norm(self.place - at_m, axis=1).argmin()
         share = numpy.linalg.norm(self.place - self.place[nearest], axis=1) / radius_m
-        is_same_side = self.normal @ self.normal[nearest] > SAME_SIDE
-        depth = numpy.where((share < 1) & is_same_side, cut_m * (1 - numpy.minimum(share, 1) ** 2) ** 2, 0.0)
+        depth = numpy.where(self.sites.normal @ self.sites.normal[nearest] > SAME_SIDE, cut_m * grid.fade(share), 0.0)
         return nearest, depth
-
-    def find_sites(self):
-        """(T, 3) the site of each corner: of those of its vertex, the one whose normal is nearest to the triangle's."""
-        corners = self.vertices[self.triangles]
-        normal = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        order = numpy.argsort(self.vertex, kind="stable")
-        first = numpy.searchsorted(self.vertex[order], self.triangles)
-        best, most = order[first], numpy.full(self.triangles.shape, -numpy.inf)
-        for step in range(int(numpy.bincount(self.vertex).max())):
-            site = order[numpy.minimum(first + step, len(order) - 1)]
-            along = numpy.where(self.vertex[site] == self.triangles, (self.normal[site] * normal[:, None]).sum(axis=2), -numpy.inf)
-            best, most = numpy.where(along > most, site, best), numpy.maximum(along, most)
-        return best
 
 
 def run_program(words, is_text=True):
@@ -161,34 +152,34 @@ def show_place(place):
     return "(" + ", ".join(f"{x:.4g}" for x in place) + ")"
 
 
-def list_spot(sites, changes, out):
+def list_spot(found, changes, out):
     out.append(f"{'mode':>5} {'Hz':>10}  {'cents':>8}  kind")
-    for k in range(sites.count):
-        out.append(f"{k + 1:>5} {sites.freq_hz[k]:>10.2f}  {changes[k]:>+8.2f}  {sites.kind[k]}")
+    for k in range(found.count):
+        out.append(f"{k + 1:>5} {found.freq_hz[k]:>10.2f}  {changes[k]:>+8.2f}  {found.kind[k]}")
 
 
-def list_whole(sites, changes, constants, out):
-    trusted = numpy.flatnonzero(~sites.doubtful)
+def list_whole(found, changes, constants, out):
+    trusted = numpy.flatnonzero(~found.sites.doubtful)
     out.append(f"{'mode':>5} {'Hz':>10}  {'cents':>8}  {'lowered most at [m]':<34}{'raised most at [m]':<34}kind")
-    for k in range(sites.count):
-        density = sites.density[trusted, k]
-        low, high = (show_place(sites.place[trusted[i]]) for i in (density.argmin(), density.argmax()))
-        out.append(f"{k + 1:>5} {sites.freq_hz[k]:>10.2f}  {changes[k]:>+8.2f}  {low:<34}{high:<34}{sites.kind[k]}")
+    for k in range(found.count):
+        density = found.sites.density[trusted, k]
+        low, high = (show_place(found.place[trusted[i]]) for i in (density.argmin(), density.argmax()))
+        out.append(f"{k + 1:>5} {found.freq_hz[k]:>10.2f}  {changes[k]:>+8.2f}  {low:<34}{high:<34}{found.kind[k]}")
     width = max(len(name) for name, _ in constants) + 2
     note = "cents by 1 % of a constant (Poisson's ratios: by 0.01); shear modulus: at constant Young's modulus"
     out += ["", note, f"{'mode':>5}" + "".join(f"{name:>{width}}" for name, _ in constants)]
-    for k in range(sites.count):
+    for k in range(found.count):
         out.append(f"{k + 1:>5}" + "".join(f"{12 / math.log(2) * values[k]:>+{width}.2f}" for _, values in constants))
 
 
-def write_csv(sites, path):
+def write_csv(found, path):
     with path.open("w", newline="") as file:
         table = csv.writer(file)
-        table.writerow("x_m y_m z_m nx ny nz area_m2 doubtful".split() + [f"mode_{k + 1}_cent_per_mm_m2" for k in range(sites.count)])
-        for s in range(len(sites.vertex)):
-            fixed = [*sites.place[s], *sites.normal[s], sites.area_m2[s]]
-            numbers = [f"{x:.8g}" for x in fixed] + [int(sites.doubtful[s])]
-            table.writerow(numbers + [f"{x:.6g}" for x in sites.density[s, : sites.count]])
+        table.writerow("x_m y_m z_m nx ny nz area_m2 doubtful".split() + [f"mode_{k + 1}_cent_per_mm_m2" for k in range(found.count)])
+        for s in range(len(found.sites.vertex)):
+            fixed = [*found.place[s], *found.sites.normal[s], found.sites.area_m2[s]]
+            numbers = [f"{x:.8g}" for x in fixed] + [int(found.sites.doubtful[s])]
+            table.writerow(numbers + [f"{x:.6g}" for x in found.sites.density[s, : found.count]])
 
 
 def choose_colours(density, doubtful):
@@ -201,13 +192,18 @@ def choose_colours(density, doubtful):
     return colours
 
 
-def write_glb(sites, mode, path):
+def write_glb(found, mode, path):
     """The body as glTF 2.0 with vertex colours."""
     arrays = [
-        (sites.place.astype("<f4"), "VEC3", 5126, 34962),
-        (sites.normal.astype("<f4"), "VEC3", 5126, 34962),
-        (choose_colours(sites.density[:, mode], sites.doubtful).astype("<f4"), "VEC3", 5126, 34962),
-        (sites.find_sites().astype("<u4").reshape(-1), "SCALAR", 5125, 34963),
+        (found.place.astype("<f4"), "VEC3", 5126, 34962),
+        (found.sites.normal.astype("<f4"), "VEC3", 5126, 34962),
+        (choose_colours(found.sites.density[:, mode], found.sites.doubtful).astype("<f4"), "VEC3", 5126, 34962),
+        (
+            find_sites(found.vertices, found.triangles, found.sites.vertex, found.sites.normal).astype("<u4").reshape(-1),
+            "SCALAR",
+            5125,
+            34963,
+        ),
     ]
     views, accessors, binary = [], [], b""
     for values, kind, component, target in arrays:
@@ -215,7 +211,7 @@ def write_glb(sites, mode, path):
         accessors.append({"bufferView": len(views) - 1, "componentType": component, "count": len(values), "type": kind})
         binary += values.tobytes()
     accessors[0] |= {"min": arrays[0][0].min(axis=0).tolist(), "max": arrays[0][0].max(axis=0).tolist()}
-    name = f"mode {mode + 1}, {sites.freq_hz[mode]:.1f} Hz"
+    name = f"mode {mode + 1}, {found.freq_hz[mode]:.1f} Hz"
     root = {
         "asset": {"version": "2.0", "generator": "carillon sensitivity"},
         "scene": 0,
@@ -239,44 +235,44 @@ def run(arguments):
         raise InputError(f"{wrong[0]}: the output ends in {wrong[0].suffix or 'nothing'}; give a .csv, .png or .glb file")
     if arguments.radius and arguments.at is None:
         raise InputError("--radius is of a spot; give its centre with --at X,Y,Z")
-    sites = Map(arguments.bank, programs.find_program(arguments.bin, "carillon-bank"))
-    if not 1 <= arguments.mode <= sites.count:
-        raise InputError(f"--mode {arguments.mode}: {arguments.bank} has sensitivities of the modes 1 to {sites.count}")
+    found = Map(arguments.bank, programs.find_program(arguments.bin, "carillon-bank"))
+    if not 1 <= arguments.mode <= found.count:
+        raise InputError(f"--mode {arguments.mode}: {arguments.bank} has sensitivities of the modes 1 to {found.count}")
     out = []
     if arguments.at is not None:
-        size = numpy.linalg.norm(numpy.ptp(sites.place, axis=0))
+        size = numpy.linalg.norm(numpy.ptp(found.place, axis=0))
         radius = arguments.radius or 0.1 * size
-        nearest, depth = sites.make_spot(arguments.at, radius, arguments.cut)
+        nearest, depth = found.make_spot(arguments.at, radius, arguments.cut)
         touched = depth > 0
         if touched.sum() < 8:
             raise InputError(
                 f"--radius {radius:g}: the spot has {touched.sum()} vertices of the surface; give a larger one or a finer mesh"
             )
-        volume = (sites.area_m2 * depth).sum()
+        volume = (found.sites.area_m2 * depth).sum()
         out.append(
-            f"a spot of {1e3 * arguments.cut:g} mm at {show_place(sites.place[nearest])} m, radius {1e3 * radius:g} mm: "
+            f"a spot of {1e3 * arguments.cut:g} mm at {show_place(found.place[nearest])} m, radius {1e3 * radius:g} mm: "
             f"{1e9 * volume:.3g} mm3 removed"
         )
-        if (touched & sites.doubtful).any():
+        if (touched & found.sites.doubtful).any():
             out.append("warning: the spot is near an inward edge or fixed nodes, where the changes are 40 to 90 % too low")
-        changes, constants = sites.calc_changes(depth), []
-        list_spot(sites, changes, out)
+        changes, constants = found.calc_changes(depth), []
+        list_spot(found, changes, out)
     else:
-        out.append(f"{1e3 * arguments.cut:g} mm removed from the whole surface, {1e4 * sites.area_m2.sum():.4g} cm2")
-        changes, constants = sites.calc_changes(numpy.full(len(sites.area_m2), arguments.cut)), sites.list_constants()
-        list_whole(sites, changes, constants, out)
+        out.append(f"{1e3 * arguments.cut:g} mm removed from the whole surface, {1e4 * found.sites.area_m2.sum():.4g} cm2")
+        changes, constants = found.calc_changes(numpy.full(len(found.sites.area_m2), arguments.cut)), found.list_constants()
+        list_whole(found, changes, constants, out)
     for path in arguments.output:
         if path.suffix.lower() == ".csv":
-            write_csv(sites, path)
+            write_csv(found, path)
         elif path.suffix.lower() == ".glb":
-            write_glb(sites, arguments.mode - 1, path)
+            write_glb(found, arguments.mode - 1, path)
         else:
             draw = programs.find_program(arguments.bin, "carillon-draw")
             run_program([draw, "sensitivities", arguments.bank, "-o", path, "--modes", arguments.mode])
         out.append(str(path))
     rows = [
-        {"mode": k + 1, "hz": sites.freq_hz[k], "kind": sites.kind[k], "cents": changes[k]}
+        {"mode": k + 1, "hz": found.freq_hz[k], "kind": found.kind[k], "cents": changes[k]}
         | {name: values[k] for name, values in constants}
-        for k in range(sites.count)
+        for k in range(found.count)
     ]
     return "\n".join(out), {"cut_m": arguments.cut, "modes": rows}

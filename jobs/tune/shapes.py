@@ -25,19 +25,6 @@ KEY_NODES = 16000  # of a body without a number of nodes, on the fine mesh
 KEY_STEPS = (0.03, 0.3)  # of the logarithm of a key: half the difference of two meshes; largest in a search
 
 
-def read_length(text):
-    """'3mm', '0.02 mm' or metres. InputError."""
-    word = text.strip()
-    scale = 1e-3 if word.endswith("mm") else 1.0
-    try:
-        value = scale * float(word.removesuffix("mm").removesuffix("m"))
-    except ValueError:
-        value = -1.0
-    if not 0 <= value < 100:
-        raise InputError(f"{text!r}: give a length like 3mm")
-    return value
-
-
 @dataclasses.dataclass(frozen=True)
 class Moved:
     """nodes (N, 3) m, tets (E, 10), fields (K, N, 3), names (K) of the parameters, low, high and step (K) m. smooth: parameters are
@@ -228,7 +215,7 @@ def make_map(job, mesh, cuts, most_m, side="all", wall_m=None):
     chosen = numpy.array(chosen)
     radius = 2 * away.max()
     share = numpy.linalg.norm(nodes[surface] - nodes[chosen][:, None], axis=2) / radius
-    depth = numpy.where((share < 1) & (normal[chosen] @ normal[surface].T > 0.5), (1 - share**2) ** 2, 0)
+    depth = numpy.where(normal[chosen] @ normal[surface].T > 0.5, grid.fade(share), 0)
     depth[:, ~numpy.isin(surface, allowed)] = 0
     depth /= depth.sum(axis=0).max()
     walls = find_wall(nodes, triangles, nodes[chosen], -normal[chosen])

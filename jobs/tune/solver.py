@@ -18,7 +18,7 @@ from errors import InputError, RunError
 
 # What decides the frequencies; the air, large motion, queue and files of a job do not.
 KEYS = ("mesh", "mesh_scale", "shape", "body", "accuracy_cents", "material", "band_hz", "max_modes", "element", "mass", "fixed", "solver")
-BAR_SHARES = {0: 1 / 2, 1: 1 / 3}  # of the mesh's bar, by modes/correction: docs/bank-format.md
+BAR_SHARES = {0: 1 / 2, 1: 1 / 4}  # of the mesh's bar, by modes/correction: docs/bank-format.md
 MAX_VERTICES = 2000  # sampled to compare shapes
 
 

@@ -17,6 +17,7 @@ import shapes
 import steps
 import targets
 from errors import InputError
+from quantities import LENGTH_UNITS, read_quantity
 from solver import Solver
 
 NOT_REACHED = 5  # exit code
@@ -31,7 +32,7 @@ def add_command(commands):
         "says which mode and bound are in the way, and the files are the best that was found.",
     )
     parser.set_defaults(run=run)
-    add = parser.add_argument
+    add, length = parser.add_argument, read_quantity(LENGTH_UNITS)
     add("job", metavar="JOB.json", help="a job of carillon-precompute")
     add("-o", "--out", metavar="FOLDER", default="tuned", help="output folder (default: tuned)")
     add("--partials", metavar="1,4,10", help="ratios to the fundamental; with weights 1,4,10:0.5")
@@ -64,11 +65,11 @@ def add_command(commands):
         help="where material goes: z-min (default) or z-max of a bar; inside (default) or outside of an outline; outer, inner or all "
         "(default) of a map",
     )
-    add("--wall", metavar="LENGTH", help="least wall left, like 3mm (default: a quarter of the thickness)")
-    add("--most", metavar="LENGTH", default="0.5mm", help="deepest local cut (default: 0.5mm)")
+    add("--wall", type=length, metavar="LENGTH", help="least wall left, like 3mm (default: a quarter of the thickness)")
+    add("--most", type=length, metavar="LENGTH", default="0.5mm", help="deepest local cut (default: 0.5mm)")
     add("--knots", type=int, metavar="N", help="depths along half of a bar (default: 6), along an outline (8); of a map: cuts (42)")
     add("--cents", type=float, default=0.2, help="largest distance from a wish (default: 0.2)")
-    add("--tolerance", metavar="LENGTH", default="0.02mm", help="of the milling, for the guarantee (default: 0.02mm)")
+    add("--tolerance", type=length, metavar="LENGTH", default="0.02mm", help="of the milling, for the guarantee (default: 0.02mm)")
     add("--bin", metavar="FOLDER", help="folder of carillon-precompute (default: next to this program)")
     add("--json", action="store_true", help="print the result as one JSON document")
 
@@ -80,8 +81,7 @@ def run(options):
     if options.knots is not None and not 1 <= options.knots <= 400:
         raise InputError("--knots: between 1 and 400")
     job = job_file.read_job(options.job)
-    wall = shapes.read_length(options.wall) if options.wall else None
-    tolerance = shapes.read_length(options.tolerance)
+    wall, tolerance = options.wall, options.tolerance
     say = (lambda text: None) if options.json else (lambda text: print(text, flush=True))
     solver = Solver(programs.find_program(options.bin), options.job)
     folder = tempfile.TemporaryDirectory(prefix="carillon-tune-")
@@ -93,7 +93,7 @@ def run(options):
         mesher = programs.find_program(options.bin, "carillon-mesh")
         if options.close_pairs or options.map:
             mesh = shapes.read_mesh(job, options.job, folder.name, mesher)
-            body = shapes.make_map(job, mesh, options.knots or 42, shapes.read_length(options.most), options.remove or "all", wall)
+            body = shapes.make_map(job, mesh, options.knots or 42, options.most, options.remove or "all", wall)
             make_body, start_p = lambda fineness: body, numpy.zeros(len(body.names))
         elif options.outline:
             rows, knots = shapes.read_outline(options.outline), options.knots or 8

@@ -48,8 +48,7 @@ class BlockInverse {
 /// Galerkin form of the Burton-Miller equation for outgoing sound of a closed surface, e^{-i omega t}:
 ///   [ 1/2 - K - alpha W ] p = - [ V + alpha (1/2 + K') ] q,      alpha = i / max(k, 1 / R),      q = dp / dn,
 /// p linear and continuous, q linear on each facet, W by parts (equation E10 in docs/equations.md). Unique at every wave number; with the
-/// other sign of alpha GMRES does not converge, without it the solution is not unique. assemble() computes only what depends on the
-/// wave number. n velocities.
+/// other sign of alpha GMRES diverges, without it the solution is not unique. n velocities.
 class BoundaryEquations {
  public:
   /// `velocity`: (T, 3, n) normal velocities at the corners of the facets of `surface`; `sphere` encloses it. The surface must outlive

@@ -1,4 +1,4 @@
-// What a rank does while it waits for letters. A file of its own: a simulated cluster (tests/bench/scaling) has no time to pass by polling.
+// Polling intervals of an idle rank. The simulated cluster of tests/bench/scaling has a blocking version.
 #include <sched.h>
 #include <time.h>
 

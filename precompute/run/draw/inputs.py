@@ -130,19 +130,6 @@ class Sensitivities:
         if not sites or self.vertex.min() < 0 or self.vertex.max() >= len(bank.vertices):
             raise InputError(f"{bank.path}: a site is of no vertex; run carillon-bank check on it")
 
-    def find_sites(self, bank):
-        """(T, 3) the site of each corner: of those of its vertex, the one whose normal is nearest to the triangle's."""
-        corners = bank.vertices[bank.triangles]
-        normal = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        order = numpy.argsort(self.vertex, kind="stable")
-        first = numpy.searchsorted(self.vertex[order], bank.triangles)
-        best, most = order[numpy.minimum(first, len(order) - 1)], numpy.full(bank.triangles.shape, -numpy.inf)
-        for step in range(int(numpy.bincount(self.vertex).max())):
-            site = order[numpy.minimum(first + step, len(order) - 1)]
-            along = numpy.where(self.vertex[site] == bank.triangles, (self.normal[site] * normal[:, None, :]).sum(axis=2), -numpy.inf)
-            best, most = numpy.where(along > most, site, best), numpy.maximum(along, most)
-        return best
-
 
 class Multipoles:
     """The group radiation/ of a bank: one order and (order + 1)^2 finite coefficients per mode."""

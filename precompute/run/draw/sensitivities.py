@@ -2,6 +2,7 @@
 import numpy
 
 import modes
+import sites
 from picture import vtk
 
 
@@ -21,7 +22,7 @@ def make_colours():
 
 
 def draw_sensitivities(bank, sensitivities, numbers, up):
-    triangles = sensitivities.find_sites(bank)
+    triangles = sites.find_sites(bank.vertices, bank.triangles, sensitivities.vertex, sensitivities.normal)
     place = bank.vertices[sensitivities.vertex]
     painted = []
     for number in numbers:

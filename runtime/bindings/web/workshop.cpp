@@ -121,6 +121,15 @@ std::optional<bank::Edits> read_edits(const bank::Bank& bank, std::string_view t
   return changes ? std::optional(edits) : std::nullopt;
 }
 
+/// Change of the modes with sensitivities by the cuts of an edit.
+std::vector<double> calc_cut_cents(const bank::Bank& before, const bank::Bank& edited, const bank::Edits& edits) {
+  const double uncut = edits.stiffness_scale / (edits.density_scale * edits.size_scale * edits.size_scale);
+  std::vector<double> cents;
+  for (std::size_t m = 0; m < before.sensitivities.count; ++m)
+    cents.push_back(600.0 * std::log2(edited.eigenvalue_rad2_s2[m] / (uncut * before.eigenvalue_rad2_s2[m])));
+  return cents;
+}
+
 scene::Scene read_scene(std::string_view text, std::size_t bodies) {
   scene::Scene scene = scene::parse_scene(base::parse_document(text, "scene"));
   if (!scene.surfaces.empty())
@@ -257,9 +266,9 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
   try {
     // As in scene::read_banks, for an edited bank.
     const std::optional<bank::Edits> wanted = read_edits(*as_read, edits);
-    auto played = std::make_shared<bank::Bank>(
-        bank::choose_frequencies(wanted ? bank::calc_edited(*as_read, *wanted) : *as_read, made.scene.frequencies));
-    if (wanted && !wanted->cuts.empty()) cut_cents = bank::calc_changes(*as_read, bank::calc_depth(*as_read, wanted->cuts));
+    const bank::Bank edited = wanted ? bank::calc_edited(*as_read, *wanted) : *as_read;
+    auto played = std::make_shared<bank::Bank>(bank::choose_frequencies(edited, made.scene.frequencies));
+    if (wanted && !wanted->cuts.empty()) cut_cents = calc_cut_cents(*as_read, edited, *wanted);
     const std::vector<bank::HeardMode> heard = mounting::mount(*played, described.support);
     const radiation::PutGains put = radiation::put_gains(*played, made.scene.radiation);
     described.sphere_radius_m = put.sphere_radius_m;

@@ -97,23 +97,29 @@ export class ShownBody {
       }
       color.needsUpdate = true;
     }
-    const { geometry, material } = density ? this.coloured : this;
+    this.show();
+  }
+  /** Geometry and material of the current look: coloured, sketched or as its material. */
+  show() {
+    const { geometry, material } = this.isColoured ? this.coloured : this.isSketched ? this.makeSketch() : this;
     Object.assign(this.mesh, { geometry, material });
+  }
+  makeSketch() {
+    const { color, opacity = 1 } = this.look;
+    this.sketch ??= makeGeometry(makeCorners(simplify(this.surface, kSketchCells)));
+    const material = new THREE.MeshLambertMaterial({ color, emissive: color, emissiveIntensity: 0.15, transparent: opacity < 1, opacity });
+    return { geometry: this.sketch, material };
   }
   setLook(look) {
     this.look = look;
     this.material.dispose();
     this.material = this.makeMaterial(look);
-    if (!this.isColoured) this.mesh.material = this.material;
+    this.show();
   }
   /** Draws without reflections and with few triangles, for motion without a graphics card. */
   setSketched(isSketched) {
-    const { color, opacity = 1 } = this.look;
-    this.sketch ??= makeGeometry(makeCorners(simplify(this.surface, kSketchCells)));
-    this.mesh.geometry = isSketched ? this.sketch : this.geometry;
-    this.mesh.material = isSketched
-      ? new THREE.MeshLambertMaterial({ color, emissive: color, emissiveIntensity: 0.15, transparent: opacity < 1, opacity })
-      : this.material;
+    this.isSketched = isSketched;
+    this.show();
   }
 
   /** Sets the position of the mesh's origin. */

@@ -66,7 +66,7 @@ export class Hands {
     }
     Object.assign(pointer, { kind: 'touch', body: hit.body, place: hit, at: performance.now(), pressure: this.findPressure(event) });
     if (this.gesture === 'cut') {
-      Object.assign(pointer, { kind: 'cut' });
+      pointer.kind = 'cut';
       this.cut(hit);
       return;
     }

@@ -1,8 +1,7 @@
 // The factorisation and its solves on a simulated cluster: smpirun ... simulate_ldlt.so MESH [COLUMNS [REPEATS]]. Order, mapping, plan,
-// factorisation and solves are the real ones, with real numbers; SimGrid's MPI runs the ranks in turn and gives each a clock. Messages take
-// what cluster.xml says of the network; computing takes what it says of a core: kernels by their operations, messages by their bytes. The
-// CPU time of a rank is not taken: between messages lie microseconds, and each begins with the caches of another rank. Prints one line of
-// JSON; seconds are simulated.
+// factorisation and solves are the real ones, with real numbers; SimGrid's MPI runs the ranks in turn and gives each a clock. Network
+// and rates of a core: cluster.xml; kernels are charged by operations, copies by bytes. Not by CPU time: between messages lie microseconds,
+// each with the caches of another rank. Prints one line of JSON; seconds are simulated.
 #include <fmt/format.h>
 #include <simgrid/host.h>
 #include <sys/mman.h>
@@ -56,15 +55,16 @@ const Core& find_core() {
   return core;
 }
 
-double owed_s = 0;  // computed, and not yet on the clock
-/// What a rank has done since a moment.
+double owed_s = 0;  // charged, not yet on the simulated clock
+/// Counters of a rank.
 struct Done {
   double waited_s = 0;             // for messages
   double messages = 0, bytes = 0;  // sent
 };
 Done done;
 
-void settle() {  // what is owed goes on the clock
+/// Adds the charged time to the simulated clock.
+void settle() {
   if (owed_s > 0) smpi_execute(owed_s);
   owed_s = 0;
 }
