@@ -70,7 +70,8 @@ struct Options {
   bool above_band = true;    // modes above the band of plate-like bodies (modes.hpp)
 };
 
-/// Force on body a of a contact, as impulses of equal steps; world axes.
+/// Force on the surface of body a at a contact, as impulses of equal steps; world axes. Rigid bodies may get less while their rebound is
+/// limited.
 struct Pulse {
   int contact = 0;
   double start_s = 0.0, step_s = 0.0;  // since the start of the impact
@@ -82,7 +83,7 @@ struct Books {
   double start = 0.0;                // motion, springs and modes at the start
   double given = 0.0;                // work of the bodies' accelerations
   double rigid = 0.0, spring = 0.0;  // current; spring: normal and tangential
-  double yielded = 0.0;              // current: stored by compression without force, until it has recovered
+  double yielded = 0.0;              // current: taken by limits of the rebound, until their contacts open
   double modal = 0.0;                // current, inside the band
   double dissipated_modes = 0.0;     // by modal damping
   double dissipated_contact = 0.0;   // hysteresis
@@ -155,8 +156,9 @@ class Impact {
     double impulse_n_s = 0.0;  // normal
     bool is_limited = false;   // modes push against a limit
     Pulse pulse;
-    double yielded_m = 0.0;  // compression without force, due to the limit of the rebound,
-    double yielded_j = 0.0;  // and the energy absorbed by the limit
+    double braked_n = 0.0;   // part of the force of this step kept from the rigid bodies by the limit of the rebound
+    double yielded_j = 0.0;  // energy taken by the limit since the contact closed
+    double yielded_m = 0.0;  // compression without force, by the limit, or left by an earlier impact or a softer spring
     bool is_open = false;    // not closed yet at its present position
     int silent = 0;          // steps without force after the last sample of the pulse
   };
@@ -180,7 +182,9 @@ class Impact {
   void move_body(std::size_t body);
   double calc_row_speed(const Row& row) const;
   void solve_forces();
-  bool limit_forces();
+  double calc_parting(int row) const;
+  static double calc_rigid_share(const History& contact);
+  bool limit_forces(bool is_last);
   bool is_over() const;
   double calc_rigid_energy() const;
   double calc_spring_energies() const;

@@ -10,7 +10,9 @@ namespace {
 
 constexpr double kReboundDecayRatio = 0.05;  // time constant of a limited rebound over the compression time
 constexpr int kLimitIterations = 8;          // iterations over contacts that share bodies,
-constexpr double kForceTolerance = 1e-4;     // relative to the force of a step
+constexpr double kForceTolerance = 1e-4;     // relative to the force of a step,
+constexpr double kMinModalRatio = 1e-3;      // and minimum share of modes and spring in the yield of a contact
+constexpr double kMaxYieldedM = 5e-5;        // m; maximum compression without force
 
 }  // namespace
 
@@ -37,35 +39,70 @@ void Impact::set_up_step() {
 /// Contact forces of the step, within the restitution limit of each contact.
 void Impact::solve_forces() {
   bool found = solver_.solve(laws_, A_, free_, h_, force_);
-  for (int round = 0; round < kLimitIterations && limit_forces(); ++round) found = solver_.solve(laws_, A_, free_, h_, force_) && found;
+  for (int round = 0; round < kLimitIterations && limit_forces(false); ++round)
+    found = solver_.solve(laws_, A_, free_, h_, force_) && found;
+  limit_forces(true);
   if (!found) ++misses_;
 }
 
-/// Bounds the normal forces of modes that would make rigid bodies separate too fast at the end of the step; true if any was bounded. The
-/// distance to the limit decays as exp(-t / tau), without an audible discontinuity of the force. Forces during the approach are unbounded.
-bool Impact::limit_forces() {
+/// Speed of a row at the end of the step.
+double Impact::calc_parting(int row) const {
+  const std::size_t n = rows_.size();
+  double parting = calc_row_speed(rows_[row]);
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (rows_[row].body[side] < 0) continue;
+    const Body& body = bodies_[rows_[row].body[side]];
+    parting += h_ * (dot(rows_[row].linear[side], body.acceleration_m_s2) + dot(rows_[row].angular[side], body.spin_acceleration_rad_s2));
+  }
+  for (std::size_t r = 0; r < n; ++r) parting += h_ * mobility_[row * n + r] * force_[r];
+  for (std::size_t c = 0; c < laws_.size(); ++c) parting -= h_ * mobility_[row * n + laws_[c].row] * contacts_[c].braked_n;
+  return parting;
+}
+
+/// Share of a limit of the rebound that acts on the rigid bodies alone, 0 to 1: it grows with the compression without force.
+double Impact::calc_rigid_share(const History& contact) {
+  const double yielded = std::min(contact.yielded_m / kMaxYieldedM, 1.0);
+  return yielded * yielded;
+}
+
+/// Reduces the normal forces that would make the rigid bodies separate too fast at the end of the step. At first modes and springs lose the
+/// same part: the deformed surfaces may approach without force. As this compression grows, more of the part is kept from the rigid bodies
+/// alone, so that the surfaces do not pass through each other. Rigid bodies that separate by x lose braked_n x: never a gain. The distance
+/// to the limit decays as exp(-t / tau), without an audible discontinuity. Forces during the approach are unbounded. True if the forces
+/// must be solved again: Newton iteration with the yield of modes, spring and rigid bodies.
+bool Impact::limit_forces(bool is_last) {
   const std::size_t n = rows_.size();
   bool any = false;
   for (std::size_t c = 0; c < laws_.size(); ++c) {
+    History& contact = contacts_[c];
     ContactLaw& t = laws_[c];
-    const auto row = t.row;
-    const double gain = h_ * mobility_[row * n + row];
-    if (!contacts_[c].is_limited || contacts_[c].given.restitution >= 1.0 || !(force_[row] > 0.0) || !(gain > 0.0)) continue;
-    const double before = calc_row_speed(rows_[row]), limit = contacts_[c].given.restitution * contacts_[c].closing_m_s;
-    double parting = before;
-    for (std::size_t side = 0; side < 2; ++side) {
-      if (rows_[row].body[side] < 0) continue;
-      const Body& body = bodies_[rows_[row].body[side]];
-      parting += h_ * (dot(rows_[row].linear[side], body.acceleration_m_s2) + dot(rows_[row].angular[side], body.spin_acceleration_rad_s2));
+    const std::size_t row = t.row;
+    const double mobility = mobility_[row * n + row];
+    if (!contact.is_limited || contact.given.restitution >= 1.0 || !(mobility > 0.0)) continue;
+    if (!(force_[row] > 0.0) && contact.braked_n == 0.0) continue;
+    const double before = calc_row_speed(rows_[row]), limit = contact.given.restitution * contact.closing_m_s, left = limit - before,
+                 decayed = -left * std::expm1(-h_ / (kReboundDecayRatio * (contact.pressed_s + h_))),
+                 allowed = std::max({left > 0.0 ? before + decayed : limit, 0.0, -before});
+    const double wanted =
+        std::clamp((calc_parting(t.row) - allowed) / (h_ * mobility), -contact.braked_n, std::max(0.0, force_[row] - contact.braked_n));
+    if (std::abs(wanted) <= (is_last ? 0.0 : kForceTolerance) * force_[row]) continue;
+    double more = wanted;
+    if (!is_last) {
+      const double share = calc_rigid_share(contact);
+      if (share < 1.0 && wanted > 0.0) {
+        t.max_n = std::max(0.0, force_[row] - (1.0 - share) * wanted);
+        more = share * wanted;
+      } else if (!std::isfinite(t.max_n)) {
+        double moved = free_[row];
+        for (std::size_t r = 0; r < n; ++r) moved += A_[row * n + r] * force_[r];
+        const double slope = calc_step_force(t.spring, t.compression_m, t.compression_m - moved, h_).slope,
+                     soft = slope > 0.0 ? 1.0 / slope : 0.0, all = A_[row * n + row],
+                     deformed = std::max(all - 0.5 * h_ * h_ * mobility + soft, kMinModalRatio * all);
+        more = std::max(wanted * (all + soft) / deformed, -contact.braked_n);
+      }
     }
-    for (std::size_t r = 0; r < n; ++r) parting += h_ * mobility_[row * n + r] * force_[r];
-    const double left = limit - before,
-                 allowed = left > 0.0
-                               ? std::max(0.0, before - left * std::expm1(-h_ / (kReboundDecayRatio * (contacts_[c].pressed_s + h_))))
-                               : limit;
-    const double over = (parting - allowed) / gain;
-    if (over <= kForceTolerance * force_[row]) continue;
-    t.max_n = std::max(0.0, force_[row] - over);
+    contact.braked_n += more;
+    for (std::size_t r = 0; r < n; ++r) free_[r] -= 0.5 * h_ * h_ * mobility_[r * n + row] * more;
     any = true;
   }
   return any;
@@ -119,6 +156,7 @@ void Impact::compress(std::size_t contact) {
   const double taken_j =
       -(force_[t.row] * moved_[t.row] + (calc_spring_energy(t.spring, t.compression_m) - calc_spring_energy(t.spring, before)));
   (is_limited ? c.yielded_j : books_.dissipated_contact) += taken_j;
+  if (c.braked_n > 0.0) c.yielded_j += c.braked_n * 0.5 * h_ * (calc_row_speed(rows_[t.row]) + calc_parting(t.row));
   if (!(t.compression_m > 0.0) && c.yielded_m == 0.0) books_.dissipated_contact += std::exchange(c.yielded_j, 0.0);
 }
 
@@ -158,11 +196,13 @@ void Impact::move_body(std::size_t b) {
   for (std::size_t r = 0; r < rows_.size() && is_pushed; ++r)
     for (std::size_t side = 0; side < 2; ++side)
       if (rows_[r].body[side] == static_cast<int>(b)) {
-        linear = linear + force_[r] * rows_[r].to_velocity[side];
-        angular = angular + force_[r] * rows_[r].to_spin[side];
+        const int contact = rows_[r].contact;
+        const double pushed_n = force_[r] - (laws_[contact].row == static_cast<int>(r) ? contacts_[contact].braked_n : 0.0);
+        linear = linear + pushed_n * rows_[r].to_velocity[side];
+        angular = angular + pushed_n * rows_[r].to_spin[side];
         if (!body.on_joints) continue;
-        force = force + force_[r] * rows_[r].linear[side];
-        couple = couple + force_[r] * rows_[r].angular[side];
+        force = force + pushed_n * rows_[r].linear[side];
+        couple = couple + pushed_n * rows_[r].angular[side];
       }
   const Vec3 moved = h_ * body.velocity_m_s + half * linear, turned = h_ * body.spin_rad_s + half * angular;
   body.velocity_m_s = body.velocity_m_s + h_ * linear;
@@ -208,6 +248,7 @@ void Impact::step() {
   }
   for (std::size_t b = 0; b < bodies_.size(); ++b) move_body(b);
   modes_.move(force_);
+  for (History& c : contacts_) c.braked_n = 0.0;
   ++steps_;
   quiet_ = struck ? 0 : quiet_ + 1;
 }
