@@ -19,6 +19,7 @@ constexpr int kMaxFollowed = 8;               // contacts per impact, including 
 constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
 constexpr double kFaceCosine = 0.99;          // minimum cosine between normals of one face,
 constexpr double kFlatnessRatio = 0.02;       // fraction of the size: maximum distance of corners from its plane
+constexpr double kRoundingRatio = 1e-12;      // of velocities
 constexpr double kQuietAfterImpactS = 5e-3;   // s; after the end of an impact, without slow impacts of the pair
 
 /// Area of the convex polygon of given points [m^2].
@@ -32,6 +33,14 @@ double calc_area(std::vector<Vec3> corners, const Vec3& normal) {
   for (std::size_t k = 0; k < corners.size(); ++k)
     area += 0.5 * dot(normal, cross(corners[k] - middle, corners[(k + 1) % corners.size()] - middle));
   return area;
+}
+
+/// Gives the nth body of an impact, now `b`, the velocities of its rigid body: a projection changes them to keep the momentum of an island.
+void push(impact::Impact& impact, int n, const impact::Body& b, const Vec3& velocity, const Vec3& spin) {
+  if (!(b.mass_kg > 0.0) || b.on_joints) return;
+  const Vec3 change = velocity - b.velocity_m_s, spin_change = spin - b.spin_rad_s;
+  if (norm(change) > kRoundingRatio * norm(b.velocity_m_s) || norm(spin_change) > kRoundingRatio * norm(b.spin_rad_s))
+    impact.push(n, change, spin_change);
 }
 
 }  // namespace
@@ -79,7 +88,6 @@ double ModalImpacts::calc_depth(const Pair& pair) const {
   return depth;
 }
 
-/// Depth explained by springs and modes at a point.
 double ModalImpacts::calc_depth(const Pair& pair, const Vec3& where) const {
   const double near = kSamePlaceRatio * bodies_.calc_size(pair.a, pair.b);
   double depth = 0.0;
@@ -324,6 +332,8 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
           contact.is_followed ? std::max(contact.gap_m + calc_yield(spring, bodies), 0.0) : -modal.impact->get_compression(k - 1);
     }
     modal.impact->update(bodies, springs);
+    for (int k = 0; k < count; ++k)
+      push(*modal.impact, k, bodies[k], bodies_.state(modal.bodies[k]).velocity, bodies_.placed(modal.bodies[k]).spin);
     const double begun_s = modal.impact->get_time();
     const bool ended = modal.impact->advance(to_s - modal.start_s);
     bodies = modal.impact->get_bodies();
@@ -346,8 +356,9 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
     // Once per window, to avoid many short pieces
     if (to_s >= window_end_s - 1e-9)
       for (ModalContact& contact : modal.contacts) report(contact);
-    const bool is_slow = std::all_of(modal.bodies.begin(), modal.bodies.end(),
-                                     [&](int body) { return !bodies_.moves(body) || bodies_.calc_speed(body) < kRattleSpeedMS; });
+    bool is_slow = true;  // also where a body rolls or slides fast
+    for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k)
+      is_slow = is_slow && (!(modal.impact->get_compression(k) > 0.0) || std::abs(modal.impact->calc_approach(k)) < kRattleSpeedMS);
     if (!ended && to_s - modal.start_s <= (is_slow ? kMaxSlowImpactS : kMaxImpactS)) continue;
     // The impact, and the other forces with it, extend beyond the end of the part.
     const double beyond_s = modal.start_s + modal.impact->get_time() - to_s;

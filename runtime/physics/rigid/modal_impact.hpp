@@ -69,6 +69,8 @@ class ModalImpacts {
   void begin_early(const Step& step, double length_s, const Instants& instants);
   /// Depth of a pair explained by springs and modes of its impact [m].
   double calc_depth(const Pair& pair) const;
+  /// The same at a point of the pair [m].
+  double calc_depth(const Pair& pair, const Vec3& where) const;
   /// Advances the impacts of an island to the time `to_s`, `part_s` later, with the effect of gravity and other contacts from the step.
   /// Forces are reported at the end of the window.
   void advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches);
@@ -115,7 +117,6 @@ class ModalImpacts {
   Vec3 find_station(const ModalContact& contact) const;
   template <typename Do>
   void for_contacts(const Pair& pair, Do&& act) const;
-  double calc_depth(const Pair& pair, const Vec3& where) const;
   void move_articulation(const ArticulationStep& step, const impact::Body& struck, double time_s, double step_s);
   void give_pull(const Step& step, int n, const Vec3& moved, const Vec3& turned);
   void undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s);

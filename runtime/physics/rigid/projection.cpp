@@ -25,22 +25,22 @@ constexpr double kDisplacedRatio = 0.1;  // relative to the largest displacement
 
 bool Projection::can_part(const Step& step, const Pair& pair) const {
   if (pair.cord >= 0 || !step.has(pair)) return false;
-  if (bodies_.is_moved_by_impact(pair.a) || bodies_.is_moved_by_impact(pair.b)) return false;
   return is_movable(pair.a) || is_movable(pair.b);
 }
 
 /// Excess of the deepest touch over its allowance [m].
-double Projection::find_excess(const Step& step) const {
+double Projection::find_excess(const Step& step, double step_s) const {
   double excess = 0.0;
   for (const Pair* pair : step.island().pairs) {
     if (!can_part(step, *pair)) continue;
-    for (const Contact& c : pair->contacts) excess = std::max(excess, -c.touch.gap_m - pair->sag_m);
+    for (const Contact& c : pair->contacts)
+      excess = std::max(excess, -c.touch.gap_m - touches_.calc_explained_depth(*pair, c.touch, step_s));
   }
   return excess;
 }
 
 /// `is_held`: a static body or the ground is among them.
-std::vector<Point> Projection::make_points(const Step& step, bool& is_held) const {
+std::vector<Point> Projection::make_points(const Step& step, double step_s, bool& is_held) const {
   std::vector<Point> points;
   for (const Pair* pair : step.island().pairs) {
     if (!can_part(step, *pair)) continue;
@@ -49,7 +49,7 @@ std::vector<Point> Projection::make_points(const Step& step, bool& is_held) cons
       if (!is_movable(c.a)) p.a = -1;
       if (!is_movable(c.b)) p.b = -1;
       p.friction = 0.0;
-      p.wanted = -(c.touch.gap_m + pair->sag_m) * p.normal;
+      p.wanted = -(c.touch.gap_m + touches_.calc_explained_depth(*pair, c.touch, step_s)) * p.normal;
       is_held = is_held || p.a < 0 || p.b < 0;
       points.push_back(p);
     }
@@ -66,7 +66,7 @@ void Projection::collect(const Step& step) {
   if (!is_held) return;  // a free island keeps its momentum
   for (const int i : step.island().bodies) {
     // A slow body that pays goes on creeping: a heap would not come to rest.
-    if (!is_owing(i) || !is_movable(i) || bodies_.calc_speed(i) < kSlowSpeedMS) continue;
+    if (!is_owing(i) || !can_pay(i) || bodies_.calc_speed(i) < kSlowSpeedMS) continue;
     State& s = bodies_.state(i);
     const double kinetic_j = calc_kinetic(bodies_.solid(i), s, bodies_.placed(i)), paid_j = std::min(owed_j_[i], kMaxPaidRatio * kinetic_j);
     if (!(paid_j > 0.0)) continue;
@@ -79,9 +79,9 @@ void Projection::collect(const Step& step) {
   }
 }
 
-void Projection::run(const Step& step, double allowed_m) {
+void Projection::run(const Step& step, double allowed_m, double step_s) {
   for (int round = 0; round < kIterations; ++round) {
-    const double excess = find_excess(step);
+    const double excess = find_excess(step, step_s);
     if (excess <= allowed_m) return;
     std::vector<Mover> resting(step.count());
     for (int n = 0; n < step.count(); ++n) {
@@ -89,7 +89,7 @@ void Projection::run(const Step& step, double allowed_m) {
       if (is_movable(i)) resting[n] = {1.0 / bodies_.solid(i).mass_kg, bodies_.placed(i).inverse_inertia, {}, {}};
     }
     bool is_held = false;
-    std::vector<Point> points = make_points(step, is_held);
+    std::vector<Point> points = make_points(step, step_s, is_held);
     std::vector<Mover> displacements = resting;
     if (static_cast<int>(points.size()) > kMaxFactorised || !solver_.solve_directly(displacements, points, kMaxGuesses)) {
       displacements = resting;
@@ -123,9 +123,14 @@ void Projection::move(const Step& step, const std::vector<Mover>& displacements,
     if (!is_movable(i)) continue;
     State& s = bodies_.state(i);
     const Quaternion turn = make_turn(displacements[n].spin);
+    const Vec3 spin = bodies_.placed(i).spin;
     s.centre = s.centre + displacements[n].velocity;
     s.rotation = normalise(multiply(turn, s.rotation));
-    if (is_held) s.momentum = make_rotation(turn) * s.momentum;
+    bodies_.place(i);
+    if (bodies_.is_moved_by_impact(i))
+      s.momentum = bodies_.calc_inertia(i) * spin;  // as in the impact
+    else if (is_held)
+      s.momentum = make_rotation(turn) * s.momentum;
     bodies_.place(i);
   }
   if (!is_held) turn(step, turning - calc_angular_momentum(step));
@@ -169,7 +174,7 @@ void Projection::pay(const Step& step, const std::vector<Mover>& displacements, 
   for (const Mover& d : displacements) farthest = std::max(farthest, norm(d.velocity));
   const auto for_displaced = [&](auto&& act) {
     for (int n = 0; n < step.count(); ++n)
-      if (is_movable(step.body(n)) && norm(displacements[n].velocity) >= kDisplacedRatio * farthest) act(step.body(n), displacements[n]);
+      if (can_pay(step.body(n)) && norm(displacements[n].velocity) >= kDisplacedRatio * farthest) act(step.body(n), displacements[n]);
   };
   double momentum = 0.0,
          mass = 0.0;  // along the displacement: reducing the speed by s reduces the kinetic energy by momentum s - mass s^2 / 2

@@ -116,11 +116,11 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     double h = impacts > 0 && !modal_impacts_.list().empty() ? std::min(length_s - done, kMaxStruckStepS) : length_s - done;
     bodies_.set_time(start_s + done);
     modal_impacts_.begin_early(step_, h, instants_);
-    modal_impacts_.follow(step_, h, touches_);
     modal_impacts_.end_where_touching(step_, touches_);
     const bool begins = !std::exchange(begun, true), may_sleep = begins && rest_.may_sleep(island.bodies, h);
     projection_.collect(step_);
-    projection_.run(step_, open_m);
+    projection_.run(step_, open_m, h);
+    modal_impacts_.follow(step_, h, touches_);
     if ((may_sleep && try_rest(island, h)) || (begins && rest_.try_still(island, h))) break;
     touches_.forget_closing(step_);
     const auto solve = [&] {  // true: touches were missing
@@ -183,7 +183,7 @@ bool Space::try_rest(Island& island, double length_s) {
     pair->memory.known = false;
     touches_.search(*pair, length_s);
   }
-  projection_.run(step_, kDeepM);
+  projection_.run(step_, kDeepM, 0.0);
   if (rest_.try_island(island, length_s)) return true;
   if (ledger_.costs.pushes == pushes) return false;
   ledger_.add_to(after);

@@ -90,7 +90,7 @@ class Space {
   /// Depth of a pair explained or left by a modal impact [m].
   double calc_explained_depth(int a, int b) const {
     const auto at = pairs().find({a, b});
-    return at == pairs().end() ? 0.0 : std::max(at->second.sag_m, modal_impacts_.calc_depth(at->second));
+    return at == pairs().end() ? 0.0 : touches_.calc_explained_depth(at->second);
   }
   /// Returns the impacts since the last call.
   std::vector<Strike> take_strikes() { return std::exchange(strikes_, {}); }

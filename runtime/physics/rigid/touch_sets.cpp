@@ -371,9 +371,15 @@ void TouchSets::part(Pair& pair, double depth_m, const Vec3& normal) const {
   pair.apart_m = pair.b >= 0 && depth_m > kDeepRatio * bodies_.calc_thickness(pair.a, pair.b) ? depth_m * normal : Vec3{};
 }
 
+double TouchSets::calc_explained_depth(const Pair& pair) const { return std::max(pair.sag_m, impacts_.calc_depth(pair)); }
+
+double TouchSets::calc_explained_depth(const Pair& pair, const geometry::Touch& touch, double after_s) const {
+  return std::max(pair.sag_m * std::exp(-after_s / kSagDecayS), impacts_.calc_depth(pair, touch.where_m));
+}
+
 /// Limits the separation of a pair in searches to the currently explained depth.
 void TouchSets::limit_apart(Pair& pair) const {
-  if (pair.apart_m != Vec3{}) part(pair, std::max(pair.sag_m, impacts_.calc_depth(pair)), carillon::normalise(pair.apart_m));
+  if (pair.apart_m != Vec3{}) part(pair, calc_explained_depth(pair), carillon::normalise(pair.apart_m));
 }
 
 void TouchSets::lose_stored(Pair& pair) const {

@@ -58,6 +58,10 @@ class TouchSets {
   /// Searches the touches with the bodies separated by the depth explained by springs and modes, along `normal` (to a). Past the middle of
   /// a thin body the nearest surface would be its other side.
   void part(Pair& pair, double depth_m, const Vec3& normal) const;
+  /// Depth of a pair that springs and modes of its impact explain, or that an ended one has left [m].
+  double calc_explained_depth(const Pair& pair) const;
+  /// The same at a touch, `after_s` later.
+  double calc_explained_depth(const Pair& pair, const geometry::Touch& touch, double after_s) const;
   /// Frees the contacts of two bodies after a modal impact. depth_m: explained by it; stored_j: energy of its springs, for lifting.
   void release(int a, int b, double depth_m, double stored_j);
   /// Adds the energy left in springs of ended impacts to the books.

@@ -46,7 +46,7 @@ TEST(projection, least_displacement_of_corner) {
     // min 1/2 dx^T M dx with n.(moved + turned x arm) = depth: moved = lambda n / m, turned = lambda I^-1 (arm x n).
     const Vec3 turn = stages.bodies.placed(0).inverse_inertia * turning;
     const double lambda = depth / (1.0 / stages.bodies.solid(0).mass_kg + dot(turning, turn));
-    stages.projection.run(stages.step, kMaxDepthM);
+    stages.projection.run(stages.step, kMaxDepthM, 0.0);
     const Vec3 moved = stages.bodies.state(0).centre - before.centre;
     EXPECT_NEAR(moved[2], lambda / stages.bodies.solid(0).mass_kg, 1e-3 * depth);
     EXPECT_LT(std::hypot(moved[0], moved[1]), 1e-9);
@@ -63,7 +63,7 @@ TEST(projection, work_paid_by_motion) {
     stages.begin({{0, -1}});
     const Books before = stages.calc_books();
     const double kinetic = add_up(stages.bodies).kinetic_j;
-    stages.projection.run(stages.step, kMaxDepthM);
+    stages.projection.run(stages.step, kMaxDepthM, 0.0);
     EXPECT_GT(find_least_gap(stages), -kMaxDepthM);
     const Books after = stages.calc_books();
     EXPECT_NEAR(after.calc_total(), before.calc_total(), 1e-12 * kinetic + 1e-15);
@@ -81,7 +81,7 @@ TEST(projection, lift_paid_by_later_motion) {
     stages.begin({{0, -1}});
     stages.bodies.set_time(0.1);
     const double total = stages.calc_books().calc_total();
-    stages.projection.run(stages.step, kMaxDepthM);
+    stages.projection.run(stages.step, kMaxDepthM, 0.0);
     const double lifted = stages.calc_books().lifted_j;
     ASSERT_GT(lifted, 0.0);
     const double speed = std::sqrt(lifted / 0.1);
@@ -114,7 +114,7 @@ TEST(projection, momenta_of_separated_free_bodies) {
     stages.begin({{0, 1}});
     const Momenta before = add_up(stages.bodies);
     const double total = stages.calc_books().calc_total();
-    stages.projection.run(stages.step, kMaxDepthM);
+    stages.projection.run(stages.step, kMaxDepthM, 0.0);
     EXPECT_GT(find_least_gap(stages), -kDeepM);
     EXPECT_NEAR(stages.bodies.state(0).centre[0], -0.75 * overlap, 1e-3 * overlap);
     EXPECT_NEAR(stages.bodies.state(1).centre[0] - states[1].centre[0], 0.25 * overlap, 1e-3 * overlap);
@@ -132,7 +132,7 @@ TEST(projection, permitted_depth_unchanged) {
     stages.begin({{0, -1}});
     stages.island.pairs[0]->sag_m = allowed;
     const Vec3 before = stages.bodies.state(0).centre;
-    stages.projection.run(stages.step, kMaxDepthM);
+    stages.projection.run(stages.step, kMaxDepthM, 0.0);
     EXPECT_EQ(stages.bodies.state(0).centre == before, allowed > 0.0);
     EXPECT_EQ(stages.ledger.costs.pushes > 0, allowed == 0.0);
   }
@@ -144,7 +144,7 @@ TEST(projection, lift_by_impact_springs) {
   stages.begin({{0, -1}});
   stages.touches.release(0, -1, 0.0, 1.0);
   const double total = stages.calc_books().calc_total();
-  stages.projection.run(stages.step, kMaxDepthM);
+  stages.projection.run(stages.step, kMaxDepthM, 0.0);
   const Books books = stages.calc_books();
   EXPECT_GT(find_least_gap(stages), -kMaxDepthM);
   EXPECT_EQ(books.lifted_j, 0.0);

@@ -485,7 +485,7 @@ TEST(rest, recovery_before_sleep) {
   EXPECT_TRUE(stages.rest.may_sleep(stages.island.bodies, 0.015));
   EXPECT_FALSE(stages.rest.try_island(stages.island, 5e-4));
   sag_m = 0.0;
-  stages.projection.run(stages.step, kDeepM);
+  stages.projection.run(stages.step, kDeepM, 0.0);
   EXPECT_TRUE(stages.rest.try_island(stages.island, 5e-4));
   EXPECT_NEAR(stages.bodies.state(0).centre[2], 0.02, kDeepM);
 }
