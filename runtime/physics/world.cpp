@@ -221,7 +221,7 @@ class World::Course {
       for (const rigid::Hit& hit : strike.hits)
         if (!hit.is_cord && hit.approach_m_s > 0.0 && norm(hit.impulse) > 0.0) watch_.add_hit(now_s, hit.a, hit.b);
     for (const rigid::Forces& forces : all_forces)
-      if (!forces.continues) watch_.add_hit(now_s, forces.a, forces.b);
+      if (!forces.continues && !forces.moves) watch_.add_hit(now_s, forces.a, forces.b);
     watch_.look_at_ground(space_);
     if (!space_.is_at_window()) return;
     std::vector<ContactWatch::Bodies> pairs;

@@ -156,7 +156,7 @@ void ModalImpacts::end_where_touching(const Step& step, TouchSets& touches) {
 }
 
 /// Moves a contact to its touch.
-void ModalImpacts::place(ModalContact& contact, Contact& touch, const geometry::Touch& at) {
+void ModalImpacts::place(ModalContact& contact, bool is_closed, Contact& touch, const geometry::Touch& at) {
   Forces& forces = contact.forces;
   const bool is_swapped = forces.a != touch.a;
   contact.touch = touch.touch.id;
@@ -169,6 +169,7 @@ void ModalImpacts::place(ModalContact& contact, Contact& touch, const geometry::
   if (norm(contact.station - station) < kMinMoveRatio * bodies_.calc_size(touch.a, touch.b)) return;
   report(contact);
   forces.continues = false;
+  forces.moves = is_closed;
   Hit hit{.a = touch.a, .b = touch.b, .touch = at, .triangles = touch.triangles};
   contact.station = station;
   for (const bool is_a : {true, false}) {
@@ -235,25 +236,28 @@ std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal,
 void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches) {
   const double reach_m =
       2.0 * bodies_.calc_closing_speed(pair.a, pair.b) * length_s + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kMaxDepthM;
+  const auto is_closed = [&](const ModalContact& contact) {
+    return modal.impact->get_compression(static_cast<int>(&contact - modal.contacts.data())) > 0.0;
+  };
   std::vector<Contact*> others;
   for (Contact& c : pair.contacts) {
     const auto same = std::find_if(modal.contacts.begin(), modal.contacts.end(), [&](const ModalContact& contact) {
       return !contact.is_followed && contact.is_between(pair.a, pair.b) && contact.touch == c.touch.id;
     });
     if (same != modal.contacts.end())
-      place(*same, c, touches.find_closing(pair, c, length_s));
+      place(*same, is_closed(*same), c, touches.find_closing(pair, c, length_s));
     else
       others.push_back(&c);
   }
   for (Contact* c : others) {
     const bool is_near = c->touch.gap_m < reach_m;
     if (ModalContact* nearest = find_nearest(modal, *c, is_near); nearest != nullptr) {
-      place(*nearest, *c, touches.find_closing(pair, *c, length_s));
+      place(*nearest, is_closed(*nearest), *c, touches.find_closing(pair, *c, length_s));
     } else if (is_near && modal.contacts.size() < kMaxFollowed) {
       Hit hit{.a = c->a, .b = c->b, .touch = touches.find_closing(pair, *c, length_s), .triangles = c->triangles};
       Made made;
       add_contact(modal, *c, pair.sag_m, hit, false, made);
-      place(modal.contacts.back(), *c, hit.touch);
+      place(modal.contacts.back(), false, *c, hit.touch);
     }
   }
 }

@@ -99,7 +99,7 @@ class ModalImpacts {
   void follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches);
   void part(Pair& pair, const TouchSets& touches) const;
   ModalContact* find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const;
-  void place(ModalContact& contact, Contact& touch, const geometry::Touch& at);
+  void place(ModalContact& contact, bool is_closed, Contact& touch, const geometry::Touch& at);
   std::vector<impact::Spring> find_springs(const ModalImpact& modal, double part_s) const;
   static double calc_yield(const impact::Contact& contact, const std::vector<impact::Body>& bodies);
   bool add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const;
