@@ -310,7 +310,8 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
   }
   std::optional<impact::Impact> impact;
   try {
-    impact.emplace(bodies, springs);
+    // The engine keeps the bodies apart, and the impulse of the impact must be that of the rigid bodies.
+    impact.emplace(bodies, springs, impact::Options{.max_yielded_m = std::numeric_limits<double>::infinity()});
     bool closes = false;
     for (int i = 0; i < static_cast<int>(springs.size()); ++i) closes = closes || impact->calc_approach(i) > rigid::kMinImpactSpeedMS;
     if (!closes) return false;

@@ -48,9 +48,10 @@ double Books::calc_error() const {
 }
 
 Impact::Impact(std::vector<Body> bodies, const std::vector<Contact>& contacts, const Options& options)
-    : above_band_(options.above_band), settling_s_(options.settling_s) {
+    : above_band_(options.above_band), max_yielded_m_(options.max_yielded_m), settling_s_(options.settling_s) {
   check(!contacts.empty(), "no contacts");
-  check(options.steps_per_pulse >= 1.0 && options.longest_step_s > 0.0 && options.part_s >= 0.0, "options out of range");
+  check(options.steps_per_pulse >= 1.0 && options.longest_step_s > 0.0 && options.part_s >= 0.0 && options.max_yielded_m > 0.0,
+        "options out of range");
   for (Body& body : bodies) place_body(std::move(body));
   for (const Contact& contact : contacts) add_contact(contact);
   choose_step(options);

@@ -65,9 +65,10 @@ struct Contact {
 struct Options {
   double steps_per_pulse = 20.0;  // steps per shortest elastic pulse; cost: docs/decisions/impact.md
   double longest_step_s = 1e-3;
-  double settling_s = 3e-3;  // maximum settling time of resting contacts after the others have separated
-  double part_s = 0.0;       // time without force that ends the impact; 0: the length of the longest elastic pulse
-  bool above_band = true;    // modes above the band of plate-like bodies (modes.hpp)
+  double settling_s = 3e-3;     // maximum settling time of resting contacts after the others have separated
+  double part_s = 0.0;          // time without force that ends the impact; 0: the length of the longest elastic pulse
+  bool above_band = true;       // modes above the band of plate-like bodies (modes.hpp)
+  double max_yielded_m = 5e-5;  // compression without force by a limit of the rebound; infinite: bodies and modes get the same force
 };
 
 /// Force on the surface of body a at a contact, as impulses of equal steps; world axes. Rigid bodies may get less while their rebound is
@@ -183,7 +184,7 @@ class Impact {
   double calc_row_speed(const Row& row) const;
   void solve_forces();
   double calc_parting(int row) const;
-  static double calc_rigid_share(const History& contact);
+  double calc_rigid_share(const History& contact) const;
   bool limit_forces(bool is_last);
   bool is_over() const;
   double calc_rigid_energy() const;
@@ -199,6 +200,7 @@ class Impact {
   std::vector<double> mobility_;  // (rows, rows), of the rigid bodies: relative velocity per impulse
   StepSolver solver_;
   bool above_band_ = true, ended_ = false;
+  double max_yielded_m_ = 0.0;
   int step_index_ = 0, steps_ = 0, quiet_ = 0, misses_ = 0;
   double hysteresis_of_ = -1.0, hysteresis_ = 0.0;  // cache: last restitution and its hysteresis at 1 m/s
   double h_ = 0.0, part_s_ = 0.0, settling_s_ = 0.0, fastest_ = 0.0;

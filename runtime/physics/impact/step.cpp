@@ -12,7 +12,6 @@ constexpr double kReboundDecayRatio = 0.05;  // time constant of a limited rebou
 constexpr int kLimitIterations = 8;          // iterations over contacts that share bodies,
 constexpr double kForceTolerance = 1e-4;     // relative to the force of a step,
 constexpr double kMinModalRatio = 1e-3;      // and minimum share of modes and spring in the yield of a contact
-constexpr double kMaxYieldedM = 5e-5;        // m; maximum compression without force
 
 }  // namespace
 
@@ -60,8 +59,8 @@ double Impact::calc_parting(int row) const {
 }
 
 /// Share of a limit of the rebound that acts on the rigid bodies alone, 0 to 1: it grows with the compression without force.
-double Impact::calc_rigid_share(const History& contact) {
-  const double yielded = std::min(contact.yielded_m / kMaxYieldedM, 1.0);
+double Impact::calc_rigid_share(const History& contact) const {
+  const double yielded = std::min(contact.yielded_m / max_yielded_m_, 1.0);
   return yielded * yielded;
 }
 
