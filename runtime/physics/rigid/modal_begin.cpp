@@ -281,6 +281,9 @@ double ModalImpacts::fly_to_modes(const std::vector<Hit>& hits, const std::vecto
       if (bodies_.moves(body) && bodies_.find_articulation(body) == nullptr) moving.insert(body);
     }
   if (!(start_s > now_s)) return now_s;
+  // Fast bodies would fly into each other: they begin now, with the modes of that time.
+  for (const int n : order)
+    if (bodies_.calc_approach(hits[n].touch, hits[n].a, hits[n].b) * (start_s - now_s) > kMaxDepthM) return now_s;
   for (const int body : moving) {
     bodies_.state(body) = fly(bodies_.solid(body), bodies_.state(body), bodies_.gravity(), start_s - now_s);
     bodies_.place(body);
