@@ -14,7 +14,8 @@ from errors import InputError
 TO_CENTS = 1200 / math.log(2)
 PRIOR = 0.3  # standard deviation of ln of a constant before the recording; of nu of an isotropic body PRIOR_NU
 PRIOR_NU = 0.1
-NU_RANGE = (0.0, 0.495)
+NU_RANGE = (-0.9, 0.495)
+SOLID_NU = (0.02, 0.47)  # beyond: rubber, foam, or a wrong shape
 RESOLVED = 0.5  # a constant is resolved if its standard deviation falls below this share of the prior's
 FLOOR_CENTS = 0.3  # of a measurement: temperature, support
 MISSED, EXTRA = 0.5, 4.5  # costs of a mode that is not heard and of a peak that is no mode, in squares of the deviation
@@ -22,6 +23,7 @@ STEP, STEP_NU, STEP_SIZE = 0.02, 0.01, 0.01  # of the differences
 GATE_CENTS = (40.0, 25.0, 15.0)  # deviations allowed in the first assignments
 STARTS = 5
 WRONG_CHI2 = 3.0
+HEARD, ONE_TONE_CENTS = 1 / 3, 5.0  # share of the modes that a strike lets hear, at least; modes so close sound as one
 OUTLIER, OUTLIER_CENTS = 0.1, 0.5  # share of the squared deviation left without an outlier; its least deviation
 WRONG_SIZES = (0.15, 31)  # range and number of ln of the factors tried
 GAIN = 6.0  # of cost by another size, to name it
@@ -190,7 +192,9 @@ class Matcher:
         """Starts x on a grid of one factor of all moduli and, if isotropic, nu: the best of the grid, best first, and the factors of all
         moduli by which others about as good are off."""
         factors = numpy.arange(-1.5, 1.5, 0.02)
-        nus = numpy.arange(0.05, 0.46, 0.05) if self.constants[1].is_plain else [None]
+        nus = (
+            numpy.arange(max(NU_RANGE[0], min(0.05, self.prior[1] - 1.5 * PRIOR_NU)), 0.46, 0.05) if self.constants[1].is_plain else [None]
+        )
         points = []
         for nu in nus:
             for factor in factors:
@@ -315,6 +319,15 @@ class Matcher:
         order = numpy.argsort(model.predict(fit.x))
         cost, _ = align(logs[None], self.log_peaks, self.make_sigma(model, GATE_CENTS[-1])[order] / TO_CENTS)
         return cost[0] + (((fit.x - self.prior) / self.prior_sd) ** 2).sum()
+
+    def count_heard(self, found, model):
+        """(modes that have a peak, modes up to the highest peak), those that sound as one counted once."""
+        logs = model.predict(found.x)
+        order = numpy.argsort(logs)
+        tone = numpy.empty(len(logs), int)
+        tone[order] = numpy.cumsum(numpy.diff(logs[order], prepend=-math.inf) > ONE_TONE_CENTS / TO_CENTS)
+        heard = {int(tone[mode]) for mode, _ in found.pairs}
+        return len(heard), max(heard)
 
     def find_hidden_sizes(self, found, model):
         """[(size, smallest relative change that shows [2 sd], power n of E size^n that the peaks fix)] of each size."""

@@ -158,6 +158,12 @@ class Match:
         if extra:
             left = ", ".join(f"{peak.freq_hz:.1f}" for k, peak in enumerate(self.peaks) if k not in {j for _, j in fit.pairs})
             notes.append(f"{extra} of {len(self.peaks)} peaks are no modes of this body: {left} Hz")
+        heard, modes = self.matcher.count_heard(fit, self.model)
+        if heard < constants.HEARD * modes:
+            notes.append(
+                f"only {heard} of {modes} modes up to the highest peak are heard: so few may fit by chance; check sizes, support and"
+                " material of the job before you use these constants"
+            )
         young = self.rows[0]
         for key, least, power in self.matcher.find_hidden_sizes(fit, self.model):
             if least > 0.01 and abs(power) > 0.2 and young.sd:
@@ -170,7 +176,9 @@ class Match:
                     f" = {fixed:.5g} (SI); 1 % more {key} gives {-power:+.1f} % of {young.name}"
                 )
         reasons = []
-        if any(row.name == "nu" and row.sd is not None and not 0.02 < row.value < 0.47 for row in self.rows):
+        low, high = constants.SOLID_NU
+        is_solid = low < self.matcher.material.get("poisson_ratio", 0) < high  # of a job that expects more or less, it says nothing
+        if is_solid and any(row.name == "nu" and row.sd is not None and not low < row.value < high for row in self.rows):
             reasons.append("Poisson's ratio is at the limit of solids")
         if len(fit.pairs) > sum(fit.resolved) and fit.chi2 > constants.WRONG_CHI2:
             reasons.append(f"chi2 is {fit.chi2:.1f} per degree of freedom")

@@ -14,12 +14,14 @@ import scipy.spatial
 
 import grid
 import programs
+import shapes
 import solver
 from errors import InputError
 from quantities import LENGTH_UNITS, read_quantity
 from sites import find_sites
 
 SAME_SIDE = 0.5  # cosine of the largest angle between the normals of a spot
+FIRST_ORDER, MAX_RAYS = 0.05, 64  # share of the wall that first order allows to cut; sites where the wall is measured
 
 
 def read_point(text):
@@ -139,6 +141,30 @@ class Map:
         depth = numpy.where(self.sites.normal @ self.sites.normal[nearest] > SAME_SIDE, cut_m * grid.fade(share), 0.0)
         return nearest, depth
 
+    def find_share(self, depth):
+        """(largest share of the wall that a cut (S) takes, from both sides if both are cut; the wall [m]). Sites of sharp edges, where no
+        wall is defined, do not count."""
+        inner = numpy.flatnonzero((numpy.bincount(self.sites.vertex)[self.sites.vertex] == 1) & (depth > 0.5 * depth.max()))
+        if not len(inner):
+            return 0.0, math.inf
+        at = inner[numpy.argsort(-depth[inner], kind="stable")][:: 1 + len(inner) // MAX_RAYS]
+        wall = shapes.find_wall(self.vertices, self.triangles, self.place[at], -self.sites.normal[at])
+        _, other = scipy.spatial.cKDTree(self.place).query(self.place[at] - numpy.minimum(wall, 1e3)[:, None] * self.sites.normal[at])
+        share = (depth[at] + depth[other] * numpy.isfinite(wall)) / wall
+        return share.max(), wall[share.argmax()]
+
+    def check_cut(self, depth, cut_m):
+        """A warning about the first order, or none. InputError where nothing would be left."""
+        share, wall = self.find_share(depth)
+        most = f"{1e3 * cut_m * FIRST_ORDER / share:.2g} mm" if share > 0 else ""
+        if share >= 1:
+            raise InputError(f"--cut {1e3 * cut_m:g}mm: no wall is left where it is {1e3 * wall:.3g} mm thick; give at most {most}")
+        if share > FIRST_ORDER:
+            return [
+                f"warning: {100 * share:.0f} % of the wall is cut, where first order is off by as much; give at most {most}, or solve again"
+            ]
+        return []
+
 
 def run_program(words, is_text=True):
     done = subprocess.run([str(word) for word in words], capture_output=True, text=is_text)
@@ -255,11 +281,14 @@ def run(arguments):
         )
         if (touched & found.sites.doubtful).any():
             out.append("warning: the spot is near an inward edge or fixed nodes, where the changes are 40 to 90 % too low")
+        out += found.check_cut(depth, arguments.cut)
         changes, constants = found.calc_changes(depth), []
         list_spot(found, changes, out)
     else:
         out.append(f"{1e3 * arguments.cut:g} mm removed from the whole surface, {1e4 * found.sites.area_m2.sum():.4g} cm2")
-        changes, constants = found.calc_changes(numpy.full(len(found.sites.area_m2), arguments.cut)), found.list_constants()
+        depth = numpy.full(len(found.sites.area_m2), arguments.cut)
+        out += found.check_cut(depth, arguments.cut)
+        changes, constants = found.calc_changes(depth), found.list_constants()
         list_whole(found, changes, constants, out)
     for path in arguments.output:
         if path.suffix.lower() == ".csv":
@@ -275,4 +304,5 @@ def run(arguments):
         | {name: values[k] for name, values in constants}
         for k in range(found.count)
     ]
-    return "\n".join(out), {"cut_m": arguments.cut, "modes": rows}
+    notes = [line.removeprefix("warning: ") for line in out if line.startswith("warning: ")]
+    return "\n".join(out), {"cut_m": arguments.cut, "modes": rows, "notes": notes}

@@ -73,13 +73,28 @@ class Moved:
         dropped = ("body", "accuracy_cents", "shape", "mesh_scale")
         return {key: value for key, value in self.job.items() if key not in dropped} | {"mesh": str(path.resolve())}
 
-    def calc_velocities(self, solution, depths_m):
-        """(K, S) outward motion of the sites of a Solution for each parameter."""
-        sites = solution.sites
-        apart, node = scipy.spatial.cKDTree(self.place(depths_m)).query(solution.vertices[sites.vertex])
+    def find_nodes(self, solution, depths_m):
+        """(S) nodes of the sites of a Solution."""
+        apart, node = scipy.spatial.cKDTree(self.place(depths_m)).query(solution.vertices[solution.sites.vertex])
         if apart.max() > 1e-6 * numpy.ptp(self.nodes, axis=0).max():
             raise InputError("the bank has vertices that the mesh has not")
-        return numpy.einsum("ksx,sx->ks", self.fields[:, node], sites.normal)
+        return node
+
+    def calc_velocities(self, solution, depths_m):
+        """(K, S) outward motion of the sites of a Solution for each parameter."""
+        return numpy.einsum("ksx,sx->ks", self.fields[:, self.find_nodes(solution, depths_m)], solution.sites.normal)
+
+    def leave_doubtful(self, solution, depths_m):
+        """This map without the cuts that reach doubtful sites: fixed nodes stay where they are, and derivatives are right. InputError where
+        none is left."""
+        if self.mesh is None or not solution.sites.doubtful.any():
+            return self
+        doubtful = self.find_nodes(solution, depths_m)[solution.sites.doubtful]
+        reaches = (self.fields[:, doubtful] != 0).any(axis=(1, 2))
+        if reaches.all():
+            raise InputError("every cut reaches a fixed face or an inward edge; give smaller ones, by more --knots")
+        high = numpy.where(reaches, 0, self.high)
+        return dataclasses.replace(self, high=high, step=numpy.maximum(high, 1e-9))
 
 
 def calc_entries(body, state):
@@ -244,6 +259,9 @@ class Keys:
         self.low, self.high = numpy.log(numpy.array(list(limits.values()))).T
         self.step = numpy.full(len(self.names), KEY_STEPS[1])
         self.is_length = numpy.array([name.endswith("_m") for name in self.names])
+
+    def leave_doubtful(self, _solution, _p):
+        return self
 
     def get_surfaces(self, first, last):
         return tuple((state.solution.vertices, state.solution.triangles) for state in (first, last))

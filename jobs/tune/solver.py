@@ -108,9 +108,12 @@ def read_bank(path, job_file):
         corrected = modes["corrected_frequency_hz"][:]
         order = numpy.argsort(corrected)
         mesh_bars, shares = modes["discretisation_error_cents"][:], modes["correction"][:]
-        # The bar of the k-th frequency may be that of its neighbours; the bar of the mode itself is no longer.
+        # The bar of the k-th frequency may be that of its neighbours. Where the bank has none of the modes themselves: the shorter one.
         own = mesh_bars * numpy.array([BAR_SHARES.get(int(reason), numpy.inf) for reason in shares])
         bars = numpy.fmin(modes["corrected_error_cents"][:], own)
+        if "sensitivity/own_error_cents" in bank:
+            stated = bank["sensitivity/own_error_cents"][:]
+            bars[: len(stated)] = stated
         shapes = numpy.moveaxis(modes["shape"][:].astype(float), 1, 0) * modes["shape_scale"][:][:, None, None]
         return Solution(
             modes["frequency_hz"][:][order],

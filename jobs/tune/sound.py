@@ -19,6 +19,7 @@ FLOOR_DB, RANGE_DB = 14.0, 70.0  # of a line above the local median, below the s
 NEAR = 0.015  # relative distance of the lines of one spectrum
 MAX_LINES, MAX_ADDED, MAX_STEPS = 30, 8, 15  # of a fit, by one residual
 MIN_SIGNAL = 4.0  # amplitude over its standard error
+TORN = 0.5  # lines closer than this share of their half width are one mode, of which nothing would be known
 SKIP_S, MIN_S = 0.002, 0.15
 FIT_S, FIT_DECAYS = (0.4, 0.8), 3.0  # length of the fit: so many times 1 / d of the slowest line, within these limits
 ROOM_SHARE = 0.2  # standard error of a decay in a room, of the decay
@@ -73,12 +74,13 @@ def read_wav(path):
 
 
 def find_onsets(samples, rate):
-    """Indices where the energy of the differenced signal rises threefold, within 3 ms, above its maximum of the 15 ms before."""
+    """Indices where the energy of the differenced signal rises threefold, within 3 ms, above its maximum of the 23 ms before: of a
+    period of mains hum."""
     step = max(1, round(rate / 1000))
     count = len(samples) // step
     energy = (numpy.diff(samples, prepend=samples[0])[: count * step].reshape(count, step) ** 2).sum(axis=1)
     energy = energy + 1e-12 * energy.max()
-    before = scipy.ndimage.maximum_filter1d(energy, 15, origin=7)
+    before = scipy.ndimage.maximum_filter1d(energy, 23, origin=11)
     before = numpy.concatenate([numpy.full(3, energy.min()), before])[: len(energy)]
     onsets = []
     for block in numpy.flatnonzero((energy > 3 * before) & (energy > 3e-3 * energy.max())):
@@ -216,6 +218,8 @@ class DampedSines:
             sd = numpy.sqrt(numpy.abs(numpy.diag(numpy.linalg.pinv(normal, rcond=1e-14, hermitian=True))) * numpy.tile(noise, 2))
             parts = numpy.sqrt(numpy.abs(numpy.diag(self.inverse)).reshape(2, half).max(axis=0) * noise)
             sane = (size > MIN_SIGNAL * parts) & (decay < 0.1 * 2 * math.pi * hz) & (sd[:half] < 0.02 * 2 * math.pi * hz)
+            width = TORN * numpy.minimum(decay[:, None], decay) / (2 * math.pi)
+            sane &= ~((numpy.abs(hz[:, None] - hz) < width) & (size[:, None] < size)).any(axis=1)
             if sane.all() or not sane.any():
                 return numpy.array([hz, decay, sd[:half] / (2 * math.pi), sd[half:], size])[:, sane]
             lines = list(zip(hz[sane], numpy.maximum(decay[sane], 0.0)))

@@ -228,13 +228,16 @@ class Search:
         self.say(f"solve {self.run.solves}, {name} mesh: {off} cents off")
 
     def tune(self, make_body, p):
-        """Coarse mesh, then the fine one. make_body: fineness to body."""
-        body = make_body(1.0)
-        first = self.start(body, p)
-        state = self.descend(body, first, max(COARSE_CENTS, self.cents), "coarse")
-        if self.is_reached(body, state, max(COARSE_CENTS, self.cents)):
-            body = make_body(FINE)
-            state = self.descend(body, self.visit(body, state.p, state), self.cents, "fine")
+        """Coarse mesh, then the fine one. make_body: fineness to body, the same where it has one mesh."""
+        coarse, fine = make_body(1.0), make_body(FINE)
+        enough = self.cents if fine is coarse else max(COARSE_CENTS, self.cents)
+        first = self.start(coarse, p)
+        body = coarse.leave_doubtful(first.solution, p)
+        state = self.descend(body, first, enough, "coarse")
+        if fine is not coarse and self.is_reached(body, state, enough):
+            state = self.visit(fine, state.p, state)
+            body = fine.leave_doubtful(state.solution, state.p)
+            state = self.descend(body, state, self.cents, "fine")
         reached = self.is_reached(body, state, self.cents)
         jacobian = self.find_jacobian(body, state)
         obstacle = "" if reached else self.find_obstacle(body, state, jacobian)
@@ -244,6 +247,7 @@ class Search:
         """Closes the beats of pairs (numbers from 1) by cuts of least volume; kept: modes (from 1) whose frequency stays. Linear programs:
         the matrix of each pair becomes a multiple of the unit matrix."""
         solution, bank = self.solve(body, numpy.zeros(len(body.names)))
+        body = body.leave_doubtful(solution, numpy.zeros(len(body.names)))
         pairs = targets.find_pairs(solution, WIDEST_PAIR)
         if max(numbers) > len(pairs):
             raise targets.InputError(f"--close-pairs {max(numbers)}: this body has {len(pairs)} pairs within {WIDEST_PAIR:g} cents")

@@ -111,6 +111,13 @@ void add_sensitivity_fields(const Sensitivities& s, const FileForm& form, std::v
         "1",
         "d ln f / d ln parameter; of Poisson's ratios d ln f / d nu",
         s.by_parameter.data()}});
+  if (!s.own_error_cents.empty())
+    fields.push_back({"sensitivity/own_error_cents",
+                      "<f8",
+                      {s.own_error_cents.size()},
+                      "cent",
+                      "estimate: this mode of the body, known by its shape, is no further from its corrected frequency",
+                      s.own_error_cents.data()});
 }
 
 /// Fields since version 1.1.

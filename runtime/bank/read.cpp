@@ -279,6 +279,7 @@ class Allocator {
     make_table("sensitivity/area_m2", "<f4", {sites}, s.area_m2, sites);
     make_table("sensitivity/doubtful", "|u1", {sites}, s.doubtful, sites);
     make_table("sensitivity/by_parameter", "<f8", {s.count, parameters}, s.by_parameter, s.count * parameters);
+    if (has("sensitivity/own_error_cents")) make_table("sensitivity/own_error_cents", "<f8", {s.count}, s.own_error_cents, s.count);
     make_text("sensitivity/parameters", form_.parameters);
   }
   void make_proof() const {

@@ -396,6 +396,7 @@ Sensitivities select_sensitive(const Sensitivities& sensitivities, std::span<con
   Sensitivities selected = sensitivities;
   selected.count = kept;
   selected.by_parameter.resize(sensitivities.by_parameter.size() / count * kept);
+  if (!selected.own_error_cents.empty()) selected.own_error_cents.resize(kept);
   selected.modes.clear();
   selected.scale.clear();
   selected.density.clear();
@@ -429,6 +430,9 @@ std::string find_fault(const Sensitivities& sensitivities, std::size_t vertices,
     if (!(std::isfinite(sensitivities.scale[c]) && sensitivities.scale[c] >= 0.0))
       return "sensitivity/scale is negative or not finite in row " + std::to_string(c);
   }
+  const std::vector<double>& own = sensitivities.own_error_cents;
+  if (!own.empty() && (own.size() != count || !std::all_of(own.begin(), own.end(), [](double cents) { return cents >= 0.0; })))
+    return "sensitivity/own_error_cents has not one number for each of the lowest modes, or a negative one";
   for (const double value : sensitivities.by_parameter)
     if (!std::isfinite(value)) return "sensitivity/by_parameter has a number that is not finite";
   return {};

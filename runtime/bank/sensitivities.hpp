@@ -34,6 +34,7 @@ struct Sensitivities {
   std::vector<std::uint8_t> doubtful;              // (S) 1 near inward edges and fixed nodes, where the density is much too small
   std::string parameters;                          // JSON list of p names: "young_modulus_pa", "size", ...
   std::vector<double> by_parameter;                // (n, p) d ln f / d ln parameter; of Poisson's ratios d ln f / d nu
+  std::vector<double> own_error_cents;             // (n) bar of the corrected frequency of the mode, known by its shape; may be empty
 
   bool is_empty() const { return modes.empty(); }
   std::size_t column_count() const { return modes.size(); }

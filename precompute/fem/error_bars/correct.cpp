@@ -129,13 +129,16 @@ Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, co
   }
   const OwnIntervals own = find_intervals(level, parts, corrections, verdict.least_cents);
   corrections.cents = widen_for_order(level.lambda, own, level.unlisted);
+  for (std::size_t m = 0; m < parts.size(); ++m)
+    corrections.own_cents.push_back(std::max(own.stated[m] - own.low[m], own.high[m] - own.stated[m]));
   corrections.complete_below = find_lowest_unlisted(level.lambda, own, level.unlisted);
   if (level.kind == Kind::kT4)  // where bending is octaves too high, the k-th of the list need not be the k-th of the body
     for (std::size_t m = 0; m < parts.size(); ++m)
       if (is_reliable(corrections.correction[m]) && corrections.cents[m] > kOverlaid * (own.high[m] - own.stated[m]))
         corrections.correction[m] = Correction::kRough;
   corrections.facet_cents = find_facet_cents(level, own, corrections.cents);
-  if (is_too_short(level)) std::fill(corrections.cents.begin(), corrections.cents.end(), std::numeric_limits<double>::infinity());
+  if (is_too_short(level))
+    for (auto* bars : {&corrections.cents, &corrections.own_cents}) bars->assign(bars->size(), std::numeric_limits<double>::infinity());
   return corrections;
 }
 

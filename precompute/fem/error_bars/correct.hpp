@@ -34,9 +34,10 @@ Level predict_level(const Level& level, double power, bool keeps_geometry, doubl
 
 /// One entry per mode, in the order of the mesh's frequencies. Corrected frequencies may be out of order.
 struct Corrections {
-  std::vector<double> lambda;  // (m) [rad^2/s^2] stated values: corrected, or the mesh's
-  std::vector<double> cents;   // (m) bar: distance of the k-th lowest of `lambda` from the k-th true one, k as in ErrorBars; infinite if
-                               // is_too_short()
+  std::vector<double> lambda;     // (m) [rad^2/s^2] stated values: corrected, or the mesh's
+  std::vector<double> cents;      // (m) bar: distance of the k-th lowest of `lambda` from the k-th true one, k as in ErrorBars; infinite if
+                                  // is_too_short()
+  std::vector<double> own_cents;  // (m) bar of the mode itself, known by its shape: no longer where others may take its place in the list
   std::vector<double> facet_cents;  // (m) as ErrorBars::facet_cents, around `lambda`; empty: no facets in doubt
   double complete_below = 0.0;      // [rad^2/s^2] modes of the body that are not listed lie above
   // (m) one mesh: half the mesh's bar (T4: 0.4 of it); two meshes: a quarter (straight T10: an eighth); rough estimates: the mesh's own

@@ -25,6 +25,7 @@ GROUPS = {
     "motion": "large motion: full order, coupled modes",
     "time": "long times, contacts, joints, sound",
     "touches": "contacts from the steps of other engines",
+    "tune": "sensitivities, tuning, recordings",
     "formats": "formats of other programs",
     "cross": "answers of other solvers and engines",
 }

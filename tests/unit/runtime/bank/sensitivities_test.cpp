@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -188,6 +189,7 @@ TEST(Sensitivities, ReadBackAndArePackedAndScaledWithTheBank) {
   bank.sensitivities = calc_sensitivities(bank, make_elasticity(0.3), kDensity, 4, {});
   bank.sensitivities.parameters = R"(["size"])";
   bank.sensitivities.by_parameter.assign(4, -1.0);
+  bank.sensitivities.own_error_cents = {0.5, 1.0, std::numeric_limits<double>::infinity(), 2.0};
   ASSERT_EQ(find_faults(bank), std::vector<std::string>());
   const tests::Folder folder;
   write_bank(bank, folder.path() / "bank.hdf");
@@ -196,6 +198,7 @@ TEST(Sensitivities, ReadBackAndArePackedAndScaledWithTheBank) {
   EXPECT_EQ(read.sensitivities.density, bank.sensitivities.density);
   EXPECT_EQ(read.sensitivities.modes, bank.sensitivities.modes);
   EXPECT_EQ(read.sensitivities.parameters, bank.sensitivities.parameters);
+  EXPECT_EQ(read.sensitivities.own_error_cents, bank.sensitivities.own_error_cents);
 
   const PackedBank packed = calc_packed(bank, -40.0, true);
   write_packed_bank(packed, folder.path() / "packed.hdf");
@@ -261,6 +264,7 @@ TEST(Sensitivities, ThatDisagreeAreRefused) {
   EXPECT_NE(find([](Sensitivities& s) { s.scale[0] = std::nan(""); }).find("sensitivity/scale"), std::string::npos);
   EXPECT_NE(find([](Sensitivities& s) { s.area_m2[0] = -1.0F; }).find("area_m2"), std::string::npos);
   EXPECT_NE(find([](Sensitivities& s) { s.density.pop_back(); }).find("disagree"), std::string::npos);
+  EXPECT_NE(find([](Sensitivities& s) { s.own_error_cents = {1.0}; }).find("own_error_cents"), std::string::npos);
   EXPECT_NE(find([](Sensitivities& s) { s.count = 7; }).find("lowest modes"), std::string::npos);
   for (const char* name : {"sensitivity/density", "sensitivity/vertex", "sensitivity/by_parameter", "sensitivity/modes"}) {
     Arrays arrays{good};

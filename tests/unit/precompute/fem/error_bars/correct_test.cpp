@@ -251,6 +251,17 @@ TEST(Order, of_corrected_frequencies_is_their_own_and_decides_which_are_the_lowe
   EXPECT_EQ(error_bars::find_computed_count(800), 820U);
 }
 
+TEST(Bars, of_a_mode_itself_are_those_that_it_has_without_neighbours) {
+  // The second is corrected to the first's place, with a bar that covers it many times.
+  const error_bars::Corrections both = error_bars::calc_corrections(make_level({1000, 1010}, {0.001, 0.02}));
+  for (const auto& [m, hz, interpolation] : {std::tuple{0, 1000.0, 0.001}, std::tuple{1, 1010.0, 0.02}}) {
+    const error_bars::Corrections alone = error_bars::calc_corrections(make_level({hz}, {interpolation}));
+    EXPECT_NEAR(both.own_cents[m], alone.cents[0], 1e-9);
+    EXPECT_NEAR(alone.own_cents[0], alone.cents[0], 1e-9);
+  }
+  EXPECT_GT(both.cents[0], 5 * both.own_cents[0]);
+}
+
 TEST(ShortLists, of_lumped_T4_hold_the_truth) {
   // One to three modes of thin bodies: unlisted kinds of modes, far above on the mesh, fall between them.
   for (const char* name : {"plate-thin", "strip-thick", "slab", "tile", "stick"}) {
