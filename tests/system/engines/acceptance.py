@@ -40,12 +40,6 @@ LIMITS = {
         ("bead", 240): {"windows_db": 4.5},
         ("bead", 1000): {"windows_db": 4.5},
     },
-    "simbody": {
-        ("slap", 240): {"windows_db": 3.5},
-        ("slap", 1000): {"windows_db": 3.5},
-        ("rod", 240): {"quiet_db": 22.0},
-        ("rod", 1000): {"quiet_db": 36.0},
-    },
     "impacts": {  # its stepper shares the impulse of three balls otherwise
         ("row", 60): {"first_db": 4.0, "windows_db": 4.5},
         ("row", 240): {"first_db": 4.0, "windows_db": 4.5},
