@@ -48,9 +48,6 @@ LIMITS = {
     },
     "mujoco": {
         ("tube", 240): {"windows_db": 3.5},
-        ("slide", 60): {"windows_db": 10.5},
-        ("slide", 240): {"windows_db": 10.5},
-        ("slide", 1000): {"windows_db": 10.5},
         ("row", 240): {"windows_db": 4.0},
         ("bead", 60): {"windows_db": 4.5},
         ("bead", 240): {"windows_db": 4.0},
