@@ -1,7 +1,7 @@
 // Method: a Hertz pulse of the reduced mass that explains the engine's impulse; where modes would take more than 2 % of the blow, the
 // impact is integrated from the motions before it. If the engine's impulse is less than that of rigid bodies with the same motions, the
 // forces are scaled by the ratio: the engine knows nothing of the modes' momentum. Simultaneous hits of two bodies, as of both ends of
-// a tube, are one impact.
+// a tube, are one impact, together with the contacts on which these bodies rest.
 // Source: runtime/physics/impact; K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 #include "runtime/drive/hit_sounds.hpp"
 
@@ -98,24 +98,33 @@ void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, Lastin
                     std::vector<events::Event>& events) {
   const auto name = [&](int body) { return step.scene.get_matter(body).name_hash; };
   std::stable_sort(hits.begin(), hits.end(), [&](const FinishedHit& x, const FinishedHit& y) {
+    if (x.is_shared != y.is_shared) return y.is_shared;  // impacts may include shared ones
     if (x.push_n_s != y.push_n_s) return x.push_n_s > y.push_n_s;
     if (x.touch_s != y.touch_s) return x.touch_s < y.touch_s;
     return std::pair(name(x.a), name(x.b)) < std::pair(name(y.a), name(y.b));
   });
   impacts_left_ = step.options.max_impacts;
+  const double oldest_s = step.scene.before_s - 2.0 * step.options.longest_hit_s;
+  std::erase_if(included_s_, [&](const auto& support) { return support.second < oldest_s; });
+  double largest_n_s = 0.0;
+  for (const FinishedHit& hit : hits) largest_n_s = std::max(largest_n_s, hit.push_n_s);
   std::vector<const FinishedHit*> heard;
   for (const FinishedHit& hit : hits) {
     const Vec3 where = step.place(step.scene.motions, hit.a, hit.stations_m[0]);
     lasting.note_impact(step.scene, hit.a, hit.b, where, step.scene.time_s);
     const bool is_felt = hit.push_n_s * hit.inverse_mass >= 0.2 * rigid::kMinImpactSpeedMS;
-    if (is_felt && hit.push_n_s >= kQuietRatio * hits.front().push_n_s)
+    if (is_felt && hit.push_n_s >= kQuietRatio * largest_n_s)
       heard.push_back(&hit);
     else
       ++counters.masked;
   }
   taken_.assign(heard.size(), 0);
+  const auto is_included = [&](const FinishedHit& hit) {
+    const auto found = included_s_.find(hit.spot);
+    return hit.is_shared && found != included_s_.end() && hit.opened_s < found->second;
+  };
   for (std::size_t first = 0; first < heard.size(); ++first)
-    if (taken_[first] == 0) sound(step, gather(step, heard, first), counters, events);
+    if (taken_[first] == 0 && !is_included(*heard[first])) sound(step, gather(step, heard, first), counters, events);
 }
 
 /// The hit with the simultaneous ones of its bodies, if any of them needs modes; else the hit alone.
@@ -187,7 +196,7 @@ impact::Body HitSounds::make_body(const StepView& step, int index, const Motion&
 
 /// Stores the modal states after an impact whose forces are scaled by a factor of at most `scale`, so that modes gain at most `most_j` [J].
 /// Returns the factor.
-double HitSounds::keep_ringing(const std::array<int, 2>& bodies, const impact::Impact& impact, const std::vector<impact::Body>& before,
+double HitSounds::keep_ringing(std::span<const int> bodies, const impact::Impact& impact, const std::vector<impact::Body>& before,
                                double touch_s, double scale, double most_j) {
   const impact::Books books = impact.get_books();
   std::vector<impact::Body> free = before, after = impact.get_bodies();
@@ -212,20 +221,19 @@ double HitSounds::keep_ringing(const std::array<int, 2>& bodies, const impact::I
   const double shared_j = gain_j - of_forces_j;  // work on the earlier motion; a factor x gains shared x + of_forces x^2
   if (of_forces_j > 0.0 && scale * (shared_j + scale * of_forces_j) > most_j)
     scale = (std::sqrt(shared_j * shared_j + 4.0 * of_forces_j * most_j) - shared_j) / (2.0 * of_forces_j);
-  for (std::size_t i = 0, side = 0; i < after.size(); ++i, ++side) {
-    if (bodies[side] < 0) ++side;
+  for (std::size_t i = 0; i < after.size(); ++i) {
     if (after[i].modes == nullptr) continue;
     for (std::size_t m = 0; m < free[i].q.size(); ++m) {
       free[i].q[m] += scale * after[i].q[m];
       free[i].q_dot[m] += scale * after[i].q_dot[m];
     }
-    ringing_[static_cast<std::size_t>(bodies[side])] = {std::move(free[i].q), std::move(free[i].q_dot), touch_s + impact.get_time()};
+    ringing_[static_cast<std::size_t>(bodies[i])] = {std::move(free[i].q), std::move(free[i].q_dot), touch_s + impact.get_time()};
   }
   return scale;
 }
 
 /// Sum of the normal impulses after which rigid bodies part at all contacts with their restitution [N s]. Projected Gauss-Seidel.
-double HitSounds::calc_rigid_push(const StepView& step, const std::vector<Contact>& contacts) {
+double HitSounds::calc_rigid_push(const StepView& step, std::span<const Contact> contacts) {
   constexpr int kSweeps = 20;
   // Of a contact: levers and spins per impulse of sides a and b; inverse effective mass.
   struct Row {
@@ -267,44 +275,55 @@ double HitSounds::calc_rigid_push(const StepView& step, const std::vector<Contac
   return std::accumulate(pushes.begin(), pushes.end(), 0.0);
 }
 
-/// False if it cannot be integrated: nothing is appended.
-bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters,
+/// False if it cannot be integrated: nothing is appended. As in our own contact, supported bodies are struck together with their supports.
+bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits, TouchesCounters& counters,
                           std::vector<events::Event>& events) {
-  const FinishedHit& first = contacts.front().hit;
-  impacts_left_ -= static_cast<int>(contacts.size());
+  const FinishedHit& first = hits.front().hit;
+  impacts_left_ -= static_cast<int>(hits.size());
   double touch_s = first.touch_s, longest_s = 0.0, wanted = 0.0, most_j = 0.0;
-  for (const Contact& c : contacts) {
+  for (const Contact& c : hits) {
     touch_s = std::min(touch_s, c.hit.touch_s);
     longest_s = std::max(longest_s, kLongestPulses * c.blow.duration_s);
     wanted += c.hit.push_n_s;
-    most_j += contacts.size() > 1 ? c.calc_part_j() : c.calc_lost_j();
+    most_j += hits.size() > 1 ? c.calc_part_j() : c.calc_lost_j();
+  }
+  std::vector<Contact> contacts = hits;
+  for (const FinishedHit& support : first.supports) {
+    const auto is_same = [&](const Contact& c) { return c.hit.spot == support.spot; };
+    if (impacts_left_ <= 0 || std::any_of(hits.begin(), hits.end(), is_same)) continue;
+    --impacts_left_;
+    contacts.push_back(make_contact(step, support));
   }
   std::vector<impact::Body> bodies;
-  const std::array<int, 2> pair{first.a, first.b};
-  std::array<int, 2> indices{-1, -1};
-  for (const std::size_t side : {0, 1}) {
-    if (pair[side] < 0) continue;
-    indices[side] = static_cast<int>(bodies.size());
-    bodies.push_back(make_body(step, pair[side], first.before[side], !contacts.front().shapes[side].empty(), touch_s));
-  }
+  std::vector<int> names;  // of the bodies
+  const auto find_body = [&](const Contact& c, std::size_t side) {
+    const int body = side == 0 ? c.hit.a : c.hit.b;
+    if (body < 0) return -1;
+    const auto found = std::find(names.begin(), names.end(), body);
+    if (found != names.end()) return static_cast<int>(found - names.begin());
+    names.push_back(body);
+    bodies.push_back(make_body(step, body, c.hit.before[side], !c.shapes[side].empty(), touch_s));
+    return static_cast<int>(names.size()) - 1;
+  };
   std::vector<std::array<std::vector<double>, 2>> shapes(contacts.size());
   std::vector<impact::Contact> springs;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const Contact& c = contacts[i];
     const FinishedHit& hit = c.hit;
+    const bool is_support = i >= hits.size();
     impact::Contact& contact = springs.emplace_back();
-    contact.a = indices[0];
-    contact.b = indices[1];
+    contact.a = find_body(c, 0);
+    contact.b = find_body(c, 1);
     contact.where_m = hit.before[0].centre_m + hit.before[0].rotation * (hit.stations_m[0] - step.scene.bodies[hit.a].centre_m);
     contact.normal = hit.normal;
-    contact.gap_m = (hit.touch_s - touch_s) * hit.approach_m_s;
+    contact.gap_m = is_support ? 0.0 : (hit.touch_s - touch_s) * hit.approach_m_s;
     contact.spring.stiffness = impact::calc_hertz_stiffness(c.compliance, c.radius_m);
     contact.restitution = step.calc_restitution(hit.a, hit.b);
     contact.is_limit = true;
     contact.rests = !(hit.approach_m_s > rigid::kMinImpactSpeedMS);
     contact.friction = step.calc_friction(hit.a, hit.b);
     for (const std::size_t side : {0, 1})
-      if (!c.shapes[side].empty()) shapes[i][side] = turn_shape(first.before[side].rotation, c.shapes[side]);
+      if (!c.shapes[side].empty()) shapes[i][side] = turn_shape(hit.before[side].rotation, c.shapes[side]);
     contact.shape_a = shapes[i][0];
     contact.shape_b = shapes[i][1];
   }
@@ -323,11 +342,12 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& cont
   if (pulses.empty()) return false;
   // Predicted impulses are of single points; the integrated impact has all points, so they set no limit.
   if (first.is_predicted) most_j = std::numeric_limits<double>::max();
-  const double rigid = first.is_predicted ? 0.0 : calc_rigid_push(step, contacts);
+  const double rigid = first.is_predicted ? 0.0 : calc_rigid_push(step, hits);
   const double largest = rigid > 0.0 ? std::min(1.0, wanted / rigid) : 1.0;
-  const double scale = keep_ringing(pair, *impact, bodies, touch_s, largest, most_j);
+  const double scale = keep_ringing(names, *impact, bodies, touch_s, largest, most_j);
   if (scale < largest) ++counters.limited;
-  counters.impacts += std::ssize(contacts);
+  counters.impacts += std::ssize(hits);
+  for (const Contact& c : std::span(contacts).subspan(hits.size())) included_s_[c.hit.spot] = first.end_s;
   for (std::size_t i = 0; i < contacts.size(); ++i) add_forces(step, contacts[i], touch_s, i, pulses, scale, events);
   return true;
 }

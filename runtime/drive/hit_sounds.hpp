@@ -1,6 +1,8 @@
 // Hits of a step as pulses or as impacts with modes. Internal to this folder.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -53,17 +55,18 @@ class HitSounds {
   static Contact make_contact(const StepView& step, const FinishedHit& hit);
   std::vector<Contact> gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first);
   void sound(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
-  static double calc_rigid_push(const StepView& step, const std::vector<Contact>& contacts);
+  static double calc_rigid_push(const StepView& step, std::span<const Contact> contacts);
   bool integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
   impact::Body make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s);
-  double keep_ringing(const std::array<int, 2>& bodies, const impact::Impact& impact, const std::vector<impact::Body>& before,
-                      double touch_s, double scale, double most_j);
+  double keep_ringing(std::span<const int> bodies, const impact::Impact& impact, const std::vector<impact::Body>& before, double touch_s,
+                      double scale, double most_j);
   static void add_forces(const StepView& step, const Contact& contact, double touch_s, std::size_t index,
                          std::span<const impact::Pulse> pulses, double scale, std::vector<events::Event>& events);
 
   std::vector<char> taken_;  // per hit of the step: part of an impact already
   Masks masks_{0};
-  std::vector<Ringing> ringing_;  // per body
+  std::vector<Ringing> ringing_;                // per body
+  std::map<std::uint64_t, double> included_s_;  // by position: end of the last hit whose impact included it as a support
   int impacts_left_ = 0;
 };
 

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <set>
 
 namespace carillon::drive {
 namespace {
@@ -22,6 +24,8 @@ constexpr double kDecayedRatio = 0.05;  // of the largest force: the end of a co
 constexpr double kMatchRatio = 0.2;     // of the size: distance from the last position
 constexpr double kGroupRatio = 0.05;    // of the size: points of one position; corners of an edge that lands are apart
 constexpr double kMinLoadN = 1e-9;
+constexpr std::size_t kMaxSupports = 6;  // of a hit: its impact is cubic in them
+constexpr double kNever = std::numeric_limits<double>::infinity();
 
 double calc_load_s(double dt_s) { return std::max(kLoadS, kLoadSteps * dt_s); }
 
@@ -68,12 +72,13 @@ bool rests(const StepView& step, int a, int b) { return step.scene.is_still(a) &
 void TouchSpots::advance(const StepView& step, std::span<const StepPoint> points, TouchesCounters& counters, std::vector<FinishedHit>& hits,
                          std::vector<Load>& loads) {
   counters_ = &counters;
-  struck_.assign(step.bodies.size(), 0);
+  struck_s_.assign(step.bodies.size(), kNever);
   std::vector<Group> groups = make_groups(step, points);
   for (const Group& g : groups) {
     if (!(g.approach_m_s > step.calc_slowest())) continue;
-    struck_[g.a] = 1;
-    if (g.b >= 0) struck_[g.b] = 1;
+    const double touch_s = step.scene.before_s + calc_wait_s(step, g.a, g.b, g.stations_m, g.normal, g.gap_m, g.approach_m_s);
+    for (const int body : {g.a, g.b})
+      if (body >= 0) struck_s_[body] = std::min(struck_s_[body], touch_s);
   }
   for (auto first = groups.begin(); first != groups.end();) {
     const auto last = std::find_if(first, groups.end(), [&](const Group& g) { return g.a != first->a || g.b != first->b; });
@@ -89,16 +94,35 @@ void TouchSpots::advance(const StepView& step, std::span<const StepPoint> points
     std::erase_if(pair->second, [](const Spot& spot) { return spot.is_gone; });
     pair = pair->second.empty() ? spots_.erase(pair) : std::next(pair);
   }
+  hold_shared(hits);
 }
 
 void TouchSpots::forget(int body) {
   std::erase_if(spots_, [&](const auto& pair) { return pair.first.first == body || pair.first.second == body; });
+  std::erase_if(held_, [&](const FinishedHit& hit) { return hit.a == body || hit.b == body; });
+}
+
+/// Keeps back shared hits of bodies with an open hit: its impact may include them.
+void TouchSpots::hold_shared(std::vector<FinishedHit>& hits) {
+  std::move(held_.begin(), held_.end(), std::back_inserter(hits));
+  held_.clear();
+  std::set<int> struck;
+  for (const auto& [pair, spots] : spots_)
+    for (const Spot& spot : spots)
+      if (spot.is_open && !spot.is_reported && !spot.hit.is_shared) struck.insert({pair.first, pair.second});
+  struck.erase(-1);
+  const auto kept = std::stable_partition(hits.begin(), hits.end(), [&](const FinishedHit& hit) {
+    return !hit.is_shared || (!struck.contains(hit.a) && !struck.contains(hit.b));
+  });
+  std::move(kept, hits.end(), std::back_inserter(held_));
+  hits.erase(kept, hits.end());
 }
 
 double TouchSpots::find_first_open(double now_s) const {
   for (const auto& [pair, spots] : spots_)
     for (const Spot& spot : spots)
       if (spot.is_open && !spot.is_reported) now_s = std::min(now_s, spot.hit.touch_s);
+  for (const FinishedHit& hit : held_) now_s = std::min(now_s, hit.touch_s);
   return now_s;
 }
 
@@ -175,13 +199,16 @@ void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& s
   double inverse = step.scene.calc_inverse_mass(step.get_given(), g.a, g.b, step.place(step.get_given(), g.a, g.stations_m[0]), g.normal);
   const bool is_jointed = step.bodies[g.a].pose.jointed || (g.b >= 0 && step.bodies[g.b].pose.jointed);
   if (is_jointed && parting + g.approach_m_s > slowest) inverse = std::min(inverse, (parting + g.approach_m_s) / g.push_n_s);
-  const bool is_near_hit = struck_[g.a] != 0 || (g.b >= 0 && struck_[g.b] != 0);
-  const bool shares = is_near_hit && (g.push_n_s - kSharedRatio * (weight + spot.load_n * dt)) * inverse > slowest;
+  const double struck_s = std::min(struck_s_[g.a], g.b >= 0 ? struck_s_[g.b] : kNever);
+  const bool shares = struck_s < kNever && (g.push_n_s - kSharedRatio * (weight + spot.load_n * dt)) * inverse > slowest;
   const bool is_loaded = step.scene.before_s - spot.quiet_s > kLoadS && step.scene.before_s - spot.seen_s < 1.5 * dt;
   const bool is_shaken = is_loaded && g.push_n_s < kSettledRatio * spot.load_n * dt;
   double hit = 0.0;
   if (spot.is_open || ((g.approach_m_s > slowest || shares) && !is_shaken)) {
-    const double wait_s = spot.is_open ? 0.0 : calc_wait_s(step, g.a, g.b, g.stations_m, g.normal, g.gap_m, g.approach_m_s);
+    double wait_s = 0.0;
+    if (!spot.is_open)
+      wait_s = g.approach_m_s > slowest ? calc_wait_s(step, g.a, g.b, g.stations_m, g.normal, g.gap_m, g.approach_m_s)
+                                        : struck_s - step.scene.before_s;
     // Sums over internal steps: nothing carries the bodies before they touch, nor after they have parted.
     if (!spot.is_open && step.options.points_after) weight *= parting > slowest ? 0.0 : 1.0 - wait_s / dt;
     hit = std::max(0.0, g.push_n_s - weight);
@@ -219,22 +246,84 @@ void TouchSpots::open(const StepView& step, const Group& g, double wait_s, doubl
   spot.is_open = true;
   spot.peak_n = 0.0;
   spot.hit = {.a = g.a, .b = g.b};
-  spot.hit.opened_s = step.scene.before_s;
-  spot.hit.touch_s = step.scene.before_s + wait_s;
-  spot.hit.approach_m_s = g.approach_m_s + wait_s * calc_pull(step, g.a, g.b, g.normal);
-  spot.hit.inverse_mass = inverse_mass;
+  FinishedHit& hit = spot.hit;
+  hit.spot = spot.number;
+  hit.is_shared = !(g.approach_m_s > step.calc_slowest());
+  hit.opened_s = step.scene.before_s;
+  hit.touch_s = step.scene.before_s + wait_s;
+  hit.inverse_mass = inverse_mass;
   for (const std::size_t side : {0, 1}) {
     const int body = side == 0 ? g.a : g.b;
-    if (body < 0) continue;
-    spot.hit.before[side] = step.before[body];
-    if (step.moves(body)) spot.hit.before[side].velocity_m_s = step.before[body].velocity_m_s + wait_s * step.options.gravity_m_s2;
+    if (body >= 0) hit.before[side] = step.before[body];
   }
+  if (!hit.is_shared) hit.supports = find_supports(step, spot);
+  // Until the touch bodies without support fall.
+  const auto falls = [&](int body) {
+    return !hit.is_shared && step.moves(body) &&
+           std::none_of(hit.supports.begin(), hit.supports.end(), [&](const FinishedHit& s) { return s.a == body || s.b == body; });
+  };
+  const Vec3 fall = wait_s * step.options.gravity_m_s2;
+  double closing = 0.0;
+  for (const std::size_t side : {0, 1}) {
+    const int body = side == 0 ? g.a : g.b;
+    if (!falls(body)) continue;
+    hit.before[side].velocity_m_s = hit.before[side].velocity_m_s + fall;
+    closing += (side == 0 ? -1.0 : 1.0) * dot(fall, g.normal);
+  }
+  hit.approach_m_s = g.approach_m_s + std::max(0.0, closing);
+}
+
+/// True if the bodies of a position rested on each other there before the step.
+bool TouchSpots::carries(const StepView& step, const Spot& spot) {
+  return spot.born_s < step.scene.before_s && spot.load_n > kMinLoadN && step.scene.before_s - spot.seen_s < 1.5 * step.dt_s &&
+         (!spot.is_open || spot.hit.is_shared);
+}
+
+FinishedHit TouchSpots::make_support(const StepView& step, const Spot& spot) {
+  FinishedHit support{.a = spot.a, .b = spot.b, .normal = spot.normal, .stations_m = spot.stations_m, .spot = spot.number};
+  support.curvature_per_m = spot.curvature_per_m >= 0.0 ? spot.curvature_per_m : TouchPoint::kUnknown;
+  for (const std::size_t side : {0, 1}) {
+    const int body = side == 0 ? spot.a : spot.b;
+    if (body < 0) continue;
+    support.before[side] = step.before[body];
+    support.outwards[side] = turn_back(step.before[body].rotation, (side == 0 ? -1.0 : 1.0) * spot.normal);
+  }
+  return support;
+}
+
+/// Loaded positions of the struck bodies, of those that support them, and so on; nearest bodies first.
+std::vector<FinishedHit> TouchSpots::find_supports(const StepView& step, const Spot& struck) const {
+  std::vector<FinishedHit> supports;
+  std::vector<int> bodies;
+  const auto add_body = [&](int body) {
+    if (step.moves(body) && std::find(bodies.begin(), bodies.end(), body) == bodies.end()) bodies.push_back(body);
+  };
+  add_body(struck.a);
+  add_body(struck.b);
+  std::set<std::uint64_t> found{struck.number};
+  for (std::size_t n = 0; n < bodies.size(); ++n) {
+    std::map<std::uint64_t, const Spot*> carrying;  // in the order of their numbers, which does not depend on that of the bodies
+    for (const auto& [pair, spots] : spots_) {
+      if (pair.first != bodies[n] && pair.second != bodies[n]) continue;
+      for (const Spot& spot : spots)
+        if (carries(step, spot) && !found.contains(spot.number)) carrying[spot.number] = &spot;
+    }
+    for (const auto& [number, spot] : carrying) {
+      if (supports.size() >= kMaxSupports) return supports;
+      found.insert(number);
+      supports.push_back(make_support(step, *spot));
+      add_body(spot->a);
+      add_body(spot->b);
+    }
+  }
+  return supports;
 }
 
 /// Adds the part `push_n_s` of the group's impulse to the open hit.
 void TouchSpots::gather(const StepView& step, const Group& g, double push_n_s, Spot& spot) {
   FinishedHit& hit = spot.hit;
   hit.approach_m_s = std::max(hit.approach_m_s, g.approach_m_s);
+  hit.is_shared = hit.is_shared && !(g.approach_m_s > step.calc_slowest());
   hit.push_n_s += push_n_s;
   hit.curvature_per_m += push_n_s * g.curvature_per_m;
   hit.normal = hit.normal + push_n_s * g.normal;

@@ -27,6 +27,9 @@ struct FinishedHit {
   std::array<Vec3, 2> stations_m{}, outwards{};  // on a and b, mesh axes; outward normals
   std::array<Vec3, 2> impulses_n_s{};            // on a and b, mesh axes
   std::array<Motion, 2> before{};                // motions of a and b before its first step, velocities at the touch
+  std::uint64_t spot = 0;                        // number of its position
+  bool is_shared = false;                        // its bodies did not close here: they pass on a hit elsewhere
+  std::vector<FinishedHit> supports{};           // loaded positions of the struck bodies at its begin, without impulses
 };
 
 /// Invariant: a position belongs to one pair (a, b), in the order of the names; it lives until it has had no load for a few steps.
@@ -37,7 +40,7 @@ class TouchSpots {
                std::vector<Load>& loads);
   /// Forgets all positions of a body.
   void forget(int body);
-  /// Begin of the earliest hit that is not reported yet; at most `now_s`.
+  /// Begin of the earliest hit that is not appended yet; at most `now_s`.
   double find_first_open(double now_s) const;
 
  private:
@@ -69,6 +72,10 @@ class TouchSpots {
   Spot& find_spot(const StepView& step, const Group& group, std::vector<Spot>& spots);
   void follow(const StepView& step, const Group& group, int count, Spot& spot, std::vector<FinishedHit>& hits);
   void open(const StepView& step, const Group& group, double wait_s, double inverse_mass, Spot& spot);
+  static FinishedHit make_support(const StepView& step, const Spot& spot);
+  static bool carries(const StepView& step, const Spot& spot);
+  std::vector<FinishedHit> find_supports(const StepView& step, const Spot& struck) const;
+  void hold_shared(std::vector<FinishedHit>& hits);
   void gather(const StepView& step, const Group& group, double push_n_s, Spot& spot);
   void report_early(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
   void close(const StepView& step, Spot& spot, std::vector<FinishedHit>& hits);
@@ -78,7 +85,8 @@ class TouchSpots {
   void add_load(const StepView& step, Spot& spot, std::vector<Load>& loads) const;
 
   std::map<std::pair<int, int>, std::vector<Spot>> spots_;
-  std::vector<char> struck_;  // bodies with a hit in this step
+  std::vector<FinishedHit> held_;  // shared hits, until those that caused them are complete
+  std::vector<double> struck_s_;   // per body: first touch in this step; infinity: none
   std::uint64_t numbers_ = 0;
   TouchesCounters* counters_ = nullptr;
 };

@@ -135,7 +135,7 @@ def write_scene(file, seconds, bodies):
                 "name": b["name"],
                 "bank": f"{b['kind']}.h5",
                 "position_m": b["position"],
-                "rotation_deg": b["turns"],
+                "quaternion": list(calc_quaternion(b["turns"])),
                 "velocity_m_s": b["velocity"],
                 "angular_velocity_rad_s": b["spin"],
                 "restitution": RESTITUTION,
