@@ -6,8 +6,8 @@
 //   0.4 of it for T4. If the estimate is a large share of lambda, the mesh's own interval is kept, which lies below the mesh's frequency
 //   except for the uncertainty of lumping and geometry (of T4, its part within 0.45 of the bar). Two meshes agree if |lambda' -
 //   lambda'_coarser| is less than half of the difference of their corrections, and the coarser's correction is 1.5 times as large; a mesh
-//   that agrees with one coarser mesh is not disputed by another. T10 nearly agree up to the whole difference, with a bar as much longer: on
-//   the bodies of docs/error-bars.md the error was at most 0.95 of that distance. For the undetectable part in curved elements that are
+//   that agrees with one coarser mesh is not disputed by another. T10 nearly agree up to the whole difference, with a bar as much longer:
+//   on the bodies of docs/error-bars.md the error was at most 0.95 of it. For the undetectable part in curved elements that are
 //   wide compared with their wall, see parts.hpp, calc_excess().
 // Source: Naga, Zhang and Zhou 2006, SIAM J. Sci. Comput. 28, 1289 (eigenvalues less the energy of the recovered error); Zienkiewicz and
 //   Zhu 1992.
