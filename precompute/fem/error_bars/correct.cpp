@@ -67,8 +67,9 @@ std::vector<ErrorParts> share_parts(const Level& level) {
   std::vector<ErrorParts> shared = level.parts;
   for (std::size_t first = 0, end = 0; first < shared.size(); first = end) {
     for (end = first + 1; end < shared.size() && level.lambda[end] <= level.lambda[end - 1] * (1 + kSameEigenvalue);) ++end;
-    for (double ErrorParts::*part : {&ErrorParts::interpolation, &ErrorParts::singular, &ErrorParts::bent, &ErrorParts::lumping,
-                                     &ErrorParts::geometry, &ErrorParts::geometry_noise, &ErrorParts::doubt, &ErrorParts::doubt_noise}) {
+    for (double ErrorParts::*part :
+         {&ErrorParts::interpolation, &ErrorParts::singular, &ErrorParts::bent, &ErrorParts::tractions, &ErrorParts::lumping,
+          &ErrorParts::geometry, &ErrorParts::geometry_noise, &ErrorParts::doubt, &ErrorParts::doubt_noise}) {
       double sum = 0.0;
       for (std::size_t m = first; m < end; ++m) sum += level.parts[m].*part;
       for (std::size_t m = first; m < end; ++m) shared[m].*part = sum / static_cast<double>(end - first);
