@@ -274,7 +274,6 @@ std::vector<double> find_facet_cents(const Level& level, const OwnIntervals& own
 }
 
 double find_order(const Level& level, const Level* coarser, double edge_ratio) {
-  constexpr double kFirst = 3.5;                              // of T10, coarse meshes being short of 4
   constexpr double kThin = 0.5, kMinRatio = 1.2, kMin = 1.0;  // of a crack: 2 alpha, its stress growing with r^(alpha - 1)
   const double known = find_order(level.kind);
   if (coarser != nullptr && edge_ratio > kMinRatio) {
@@ -290,8 +289,7 @@ double find_order(const Level& level, const Level* coarser, double edge_ratio) {
       return std::clamp(*middle, std::min(kMin, known), known);
     }
   }
-  if (level.kind == Kind::kT4) return known;
-  if (level.one_layer <= kThin) return kFirst;
+  if (level.kind == Kind::kT4 || level.one_layer <= kThin) return known;
   // Wide elements in bent walls are soon narrow enough to follow them.
   const bool is_bent = std::ranges::count_if(level.parts, [&](const ErrorParts& parts) { return !is_seen(parts, level.kind); }) * 2 >
                        std::ssize(level.parts);

@@ -24,8 +24,8 @@ struct Level {
 };
 
 /// Power of the edge length in the interpolation errors of this mesh: measured against a coarser mesh with `edge_ratio` > 1 times the mean
-/// edge if given, otherwise that of coarse meshes: 2 for T4 and 3.5 for T10, but 2 with a single layer of elements (bent ones: 3), which
-/// converge slower as long as refinement keeps one layer. Pure.
+/// edge if given, otherwise find_order(), or 2 for T10 bodies with a single layer of elements (bent ones: 3), which converge slower as long
+/// as refinement keeps one layer. Pure.
 double find_order(const Level& level, const Level* coarser, double edge_ratio);
 
 /// Predicted level on a mesh with edges `edge_ratio` times as long, corrected to the same values as `level`. keeps_geometry: refinement

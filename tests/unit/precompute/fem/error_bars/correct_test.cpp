@@ -324,7 +324,7 @@ TEST(Levels, that_are_predicted_keep_what_is_believed_and_shrink_its_bars) {
   Level thin = level;
   thin.one_layer = 0.9;
   EXPECT_EQ(error_bars::find_order(thin, nullptr, 1.0), 2.0);
-  EXPECT_EQ(error_bars::find_order(level, nullptr, 1.0), 3.5);
+  EXPECT_EQ(error_bars::find_order(level, nullptr, 1.0), 4.0);
   for (ErrorParts& parts : thin.parts) parts.bent = 0.1 * parts.interpolation;
   EXPECT_EQ(error_bars::find_order(thin, nullptr, 1.0), 3.0) << "bent walls";
 }
