@@ -33,6 +33,7 @@ constexpr double kHalf = 0.5, kHalfT4 = 0.4;                     // of the mesh'
 constexpr double kAgreed = 0.25, kAgreedT10 = 0.125;             // of the mesh's bar, two meshes; T10: unless walls bend
 constexpr double kAgree = 0.5, kNearlyAgree = 1.0;               // distance of two meshes, of the difference of their corrections
 constexpr double kUnseen = 0.05;                                 // of the estimate: what recovered strains do not show of bent T10
+constexpr double kCurved = 0.25;                                 // of the estimate: the surface of curved T10
 constexpr double kApart = 1.5;                                   // of the corrections of two meshes
 constexpr double kOverlaid = 12.0;        // rough: a T4 mode whose bar others make so many times its own; results are the same from 2 to 12
 constexpr double kSameEigenvalue = 1e-6;  // of lambda
@@ -56,10 +57,11 @@ Correction find_correction(const ErrorParts& parts, const Level& level, bool has
 
 bool is_reliable(Correction correction) { return correction == Correction::kOneMesh || correction == Correction::kTwoMeshes; }
 
-/// Of T10: recovered strains show nearly all of the estimate, walls being flat or thick.
+/// Of T10: recovered strains show nearly all of the estimate, walls being flat or thick and surfaces well met (a cone's is not near its
+/// tip).
 bool is_seen(const ErrorParts& parts, Kind kind) {
   const double excess = calc_excess(parts, kind);
-  return kind != Kind::kT4 && excess - parts.interpolation <= kUnseen * excess;
+  return kind != Kind::kT4 && excess - parts.interpolation <= kUnseen * excess && std::abs(parts.geometry) <= kCurved * excess;
 }
 
 /// Averages the parts of degenerate modes.

@@ -39,9 +39,9 @@ struct Corrections {
                                // is_too_short()
   std::vector<double> facet_cents;  // (m) as ErrorBars::facet_cents, around `lambda`; empty: no facets in doubt
   double complete_below = 0.0;      // [rad^2/s^2] modes of the body that are not listed lie above
-  // (m) one mesh: half the mesh's bar (T4: 0.4 of it); two meshes: a quarter (T10 but for bent walls and rims: an eighth), up to twice that
-  // where T10 nearly agree; rough estimates: the mesh's own interval; uncorrected modes: the mesh's bar; disputed modes: the distance of
-  // the two meshes
+  // (m) one mesh: half the mesh's bar (T4: 0.4 of it); two meshes: a quarter (most T10: an eighth, see docs/error-bars.md), up to twice
+  // that where T10 nearly agree; rough estimates: the mesh's own interval; uncorrected modes: the mesh's bar; disputed modes: the distance
+  // of the two meshes
   std::vector<bank::Correction> correction;
 };
 

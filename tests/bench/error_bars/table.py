@@ -131,8 +131,8 @@ def print_pairs(groups):
     for (body, _, element, unknowns), rows in sorted(groups.items(), key=lambda item: item[0][3]):
         if element in ("T10", "T10 curved"):
             meshes[body, element].append(read_mesh(rows))
-    counts = {name: [0, 0] for name in ("straight", "curved", "curved, bent walls", "rough at rims")}
-    is_seen = lambda mode: 4 * float(mode["bent"]) <= 0.05 * calc_excess(mode)
+    counts = {name: [0, 0] for name in ("straight", "curved", "curved, unseen parts", "rough at rims")}
+    is_seen = lambda mode: 4 * float(mode["bent"]) <= 0.05 * calc_excess(mode) and abs(float(mode["geometry"])) <= 0.25 * calc_excess(mode)
     for (_, element), (coarse, fine, *_) in meshes.items():
         for (before, mesh_before, _, mode_before, trust_before, _), (now, mesh, own, mode, trust, beyond) in zip(coarse, fine):
             by, by_before = mesh - now, mesh_before - before
@@ -141,7 +141,7 @@ def print_pairs(groups):
                 continue
             apart = abs(before - now) / abs(by_before - by)
             are_seen = not is_rim and is_seen(mode) and is_seen(mode_before)
-            name = "rough at rims" if is_rim else "straight" if element == "T10" else "curved" if are_seen else "curved, bent walls"
+            name = "rough at rims" if is_rim else "straight" if element == "T10" else "curved" if are_seen else "curved, unseen parts"
             if apart <= 1:
                 counts[name][0] += 1
                 counts[name][1] += beyond <= (0.125 if are_seen else 0.25) * max(1, 2 * apart) * own

@@ -194,6 +194,10 @@ TEST(TwoMeshes, that_agree_shorten_the_bar_to_an_eighth) {
   before.parts[0].interpolation = 0.8 * 0.16;  // the same excess, a fifth of it for what strains do not show
   before.parts[0].bent = 0.05 * 0.16;
   EXPECT_NEAR(find_share(), 0.25, 1e-9) << "a bent wall on the coarser mesh";
+  before = coarse;
+  before.kind = Kind::kT10Curved;
+  round.parts[0].geometry = -0.003;  // of 0.01
+  EXPECT_NEAR(find_share(), 0.25, 1e-9) << "a surface that the elements miss";
 }
 
 TEST(TwoMeshes, that_nearly_agree_leave_a_bar_as_long_as_they_are_apart) {
