@@ -111,7 +111,7 @@ def calc_excess(row):
 
 
 def read_mesh(rows):
-    """Of the k-th corrected frequency: lambda corrected and of the mesh; the mode's own bar, row, verdict; the error beyond the reference's."""
+    """Of the k-th corrected frequency: lambda corrected and of the mesh; the mode's own bar, row, verdict; the error beyond the truth's."""
     found = []
     for row in rows:
         if int(row["corrected_mode"]) >= len(rows):
