@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "precompute/eigen/memory.hpp"
@@ -69,7 +70,8 @@ BandCounter Search::get_band_counter() {
 
 Slice Search::cut_to_wanted(const Slice& band) {
   if (!body_.options.max_modes) return band;
-  return cut_to_lowest(band, *body_.options.max_modes, [this](double lambda) { return count_below(lambda).below; });
+  const double expected = body_.scaling.to_scaled(std::pow(2 * std::numbers::pi * body_.options.expected_hz, 2));
+  return cut_to_lowest(band, *body_.options.max_modes, expected, [this](double lambda) { return count_below(lambda).below; });
 }
 
 KrylovRequest Search::make_request(const Slice& slice, double sigma, Missing missing, int round) const {

@@ -47,14 +47,17 @@ double Counts::find_lambda(double below, double margin) const {
   return root * root;
 }
 
-Slice cut_to_lowest(const Slice& band, std::int64_t wanted, const CountBelow& count_below) {
+Slice cut_to_lowest(const Slice& band, std::int64_t wanted, double expected, const CountBelow& count_below) {
   if (wanted >= band.count()) return band;
   constexpr int kTrials = 8;
   const std::int64_t enough = wanted + std::max<std::int64_t>(10, wanted / 16);
   Slice cut = band;
-  Counts counts(band);
+  Counts counts(band), guessed(band);
+  const bool is_guessed = expected > band.low && expected < band.high;
+  if (is_guessed) guessed.add(expected, band.below_low + wanted);
   for (int i = 0; i < kTrials && cut.count() > enough; ++i) {
-    const double trial = counts.find_lambda(static_cast<double>(band.below_low) + 0.5 * static_cast<double>(wanted + enough), kNearEnd);
+    const double middle = static_cast<double>(band.below_low) + 0.5 * static_cast<double>(wanted + enough);
+    const double trial = i == 0 && is_guessed ? guessed.find_lambda(middle, 0.0) : counts.find_lambda(middle, kNearEnd);
     const std::int64_t below = count_below(trial);
     counts.add(trial, below);
     if (below - band.below_low < wanted) continue;

@@ -34,8 +34,9 @@ class Counts {
   std::map<double, std::int64_t> known_;  // relative to below_low_
 };
 
-/// Lowers the upper end until the slice holds slightly more than `wanted` eigenvalues; unchanged if it holds no more.
-Slice cut_to_lowest(const Slice& band, std::int64_t wanted, const CountBelow& count_below);
+/// Lowers the upper end until the slice holds slightly more than `wanted` eigenvalues; unchanged if it holds no more. expected: guess of
+/// the last one wanted, used if it lies in the band.
+Slice cut_to_lowest(const Slice& band, std::int64_t wanted, double expected, const CountBelow& count_below);
 
 /// Splits a band into slices of at most about `max` eigenvalues, upwards. A slice costs only the count at its shift, where K - sigma M is
 /// factorised anyway; the modes above the shift are verified at the next shift.

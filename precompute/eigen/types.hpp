@@ -80,7 +80,8 @@ struct Options {
   double low_hz = 20;  // both ends are inclusive
   double high_hz = 20e3;
   std::optional<std::int64_t> max_modes;  // only the lowest modes of the band
-  double tolerance = 1e-8;                // bound on the relative residual of every mode; see Modes::residual
+  double expected_hz = 0;   // guess of the last of max_modes modes; 0: none. A good one saves counts; the modes do not depend on it
+  double tolerance = 1e-8;  // bound on the relative residual of every mode; see Modes::residual
   Factorisation factorisation = Factorisation::kAutomatic;
   Method method = Method::kAutomatic;
   /// Memory limit of all ranks of a host together [byte]; 0: limits of the machine, its cgroup and the process.

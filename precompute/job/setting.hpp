@@ -14,6 +14,8 @@ struct Setting {
   std::optional<std::int64_t> nodes;  // body meshed by the run: target count, mid-side nodes included,
   std::optional<double> edge_m;       // or target edge length; neither: the mesher's default
   int refinements = 0;                // mesh file: uniform refinements, each splits a tetrahedron into eight
+  int layers = 1;                     // body of a known shape: minimum of elements through its least thickness
+  double expected_hz = 0.0;           // guess of the last mode of "max_modes", from a coarser mesh; 0: none
 };
 
 /// Setting of a job without "accuracy_cents".

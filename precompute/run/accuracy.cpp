@@ -27,13 +27,22 @@ namespace {
 
 constexpr std::size_t kMaxTrials = 7;
 constexpr std::int64_t kCoarseShapeNodes = 1500, kCoarseSurfaceNodes = 6000;
-constexpr double kGoal = 0.85;         // safety factor of the target, so that the next trial is the last
-constexpr double kFinestStep = 0.25;   // range of the convergence rates, see predict_level()
-constexpr double kUnsureGrowth = 3.0;  // maximum, of the nodes until two meshes agree on the mode with the widest bar
-constexpr double kApart = 0.9;         // then on the edges, so that the next mesh is far enough from this one for a verdict
-constexpr double kMinStep = 0.9;       // maximum: nearly equal edges give no new information
-constexpr int kMaxCounts = 4;          // node counts tried per trial
-constexpr int kMaxRefinements = 4;     // of a mesh file: 4,096 elements per element
+constexpr double kGoal = 0.85;          // safety factor of the target, so that the next trial is the last
+constexpr double kFinestStep = 0.25;    // range of the convergence rates, see predict_level()
+constexpr double kUnsureGrowth = 6.0;   // maximum, of the nodes until two meshes agree on the mode with the widest bar,
+constexpr double kRoughGrowth = 3.0;    // and while an estimate is rough
+constexpr double kLayered = 0.5;        // of the estimate of the widest bar: tractions, of which one layer leaves the most
+constexpr double kLayeredGrowth = 1.1;  // of the nodes with the second layer: the edges in the plane become longer
+constexpr double kApart = 0.5;          // maximum, of the corrections until then, so that the next mesh is far enough for a verdict
+constexpr double kMinStep = 0.9;        // maximum: nearly equal edges give no new information
+constexpr int kMaxCounts = 4;           // node counts tried per trial
+constexpr int kMaxRefinements = 4;      // of a mesh file: 4,096 elements per element
+
+/// To three digits, so that rounding on another number of ranks gives the same.
+double round_hz(double hz) {
+  const double unit = std::pow(10.0, std::floor(std::log10(hz)) - 2);
+  return unit * std::round(hz / unit);
+}
 
 /// Next step of all ranks, decided on rank 0.
 struct Decision {
@@ -75,6 +84,9 @@ class Search {
   std::vector<error_bars::Level> list_coarser(const Trial& trial) const;
   double measure_exponent(double Trial::*quantity, double fallback, double min, double max) const;
   double find_dimension() const;
+  double find_last_hz() const;
+  bool are_reliable() const;
+  bool wants_layer() const;
   double predict_worst(bool keeps_geometry, double ratio) const;
   double find_ratio(double goal_cents, double min) const;
   std::vector<std::size_t> find_listed(const error_bars::Corrections& corrections) const;
@@ -161,8 +173,37 @@ double Search::measure_exponent(double Trial::*quantity, double fallback, double
   return std::clamp(std::log(last.*quantity / before->*quantity) / nodes, min, max);
 }
 
+/// The last computed mode of "max_modes"; 0 if the band ends before it.
+double Search::find_last_hz() const {
+  const std::vector<double>& lambda = current_.solved.errors.bars.corrected.lambda;
+  if (lambda.empty() || find_computed_count(run_.job) != static_cast<std::int64_t>(lambda.size())) return 0.0;
+  return round_hz(std::sqrt(*std::ranges::max_element(lambda)) / (2 * std::numbers::pi));
+}
+
+/// No mode of the bank is rough or stiff.
+bool Search::are_reliable() const {
+  const error_bars::Corrections& corrections = current_.solved.errors.bars.corrected;
+  return std::ranges::all_of(find_listed(corrections), [&](std::size_t m) {
+    return corrections.correction[m] == bank::Correction::kOneMesh || corrections.correction[m] == bank::Correction::kTwoMeshes;
+  });
+}
+
+/// One layer of T10 bends with a constant shear through the thickness, however fine it is in the plane, and leaves its traction on the
+/// faces.
+bool Search::wants_layer() const {
+  const error_bars::ErrorBars& bars = current_.solved.errors.bars;
+  if (run_.job.body->shape.empty() || report_.trials.back().setting.layers > 1) return false;
+  const std::vector<std::size_t> listed = find_listed(bars.corrected);
+  const auto widest =
+      std::ranges::max_element(listed, {}, [&](std::size_t m) { return bars.algebraic_cents[m] + bars.corrected.cents[m]; });
+  return widest != listed.end() && bars.level.parts[*widest].tractions > kLayered * bars.level.parts[*widest].interpolation;
+}
+
 /// Growth exponent of the nodes with 1 / edge length: thin bodies refine in two directions.
-double Search::find_dimension() const { return -1.0 / measure_exponent(&Trial::edge_m, -1.0 / 3, -1.0 / 2, -1.0 / 3.3); }
+double Search::find_dimension() const {
+  const bool is_thin = current_.solved.errors.bars.level.one_layer > 0.5;
+  return -1.0 / measure_exponent(&Trial::edge_m, is_thin ? -1.0 / 2 : -1.0 / 3, -1.0 / 2, -1.0 / 3.3);
+}
 
 /// Peak memory of all ranks for `size`, scaled from a trial.
 double calc_bytes(const Trial& trial, const cost::ProblemSize& size) {
@@ -190,6 +231,7 @@ Setting Search::make_setting(job::Element element, double ratio) const {
   Setting setting = last.setting;
   setting.element = element;
   setting.tolerance = tolerance_;
+  setting.expected_hz = find_last_hz();
   setting.nodes = std::llround(static_cast<double>(last.nodes) * std::pow(ratio, -find_dimension()));
   return setting;
 }
@@ -240,12 +282,17 @@ std::string Search::describe_surface(double cents) const {
 Decision Search::decide_on_body() {
   const Trial& last = report_.trials.back();
   if (last.modes == 0) return {0, make_setting(last.setting.element, 0.5)};
-  // Errors estimated on one mesh are often twenty times too large; two meshes that agree tell more, and one of three times the nodes is
-  // cheap.
-  const bool is_agreed = last.correction == bank::Correction::kTwoMeshes;
-  const double finest = is_agreed ? kFinestStep : std::pow(kUnsureGrowth, -1.0 / find_dimension());
-  const double ratio = find_ratio(kGoal * asked_, finest) * (is_agreed ? 1.0 : kApart);
-  return {0, make_setting(last.setting.element, std::clamp(ratio, finest, kMinStep))};
+  // Errors estimated on one mesh are often twenty times too large; two meshes that agree tell more.
+  if (wants_layer()) {
+    Setting setting = make_setting(last.setting.element, std::pow(kLayeredGrowth, -1.0 / find_dimension()));
+    setting.layers = 2;
+    return {0, setting};
+  }
+  const bool is_reliable = are_reliable(), is_agreed = is_reliable && last.correction == bank::Correction::kTwoMeshes;
+  const double finest = is_agreed ? kFinestStep : std::pow(is_reliable ? kUnsureGrowth : kRoughGrowth, -1.0 / find_dimension());
+  const double longest = is_agreed ? kMinStep : std::min(kMinStep, std::pow(kApart, 1.0 / order_));
+  const double ratio = find_ratio(kGoal * asked_, finest);
+  return {0, make_setting(last.setting.element, std::clamp(ratio, finest, std::max(finest, longest)))};
 }
 
 /// Rank 0: next setting of a mesh file: T4, T10, T10 refined.
@@ -253,6 +300,7 @@ Decision Search::decide_on_file() {
   const Trial& last = report_.trials.back();
   Setting setting = last.setting;
   setting.tolerance = tolerance_;
+  setting.expected_hz = find_last_hz();
   if (last.setting.element == job::Element::T4) {
     setting.element = job::Element::T10;
     return {0, setting};
@@ -404,6 +452,7 @@ base::Json describe_setting(const Setting& setting) {
   base::Json value;
   value.set("element", job::to_text(setting.element)).set("tolerance", setting.tolerance);
   if (setting.nodes) value["body_nodes"] = *setting.nodes;
+  if (setting.layers > 1) value["body_layers"] = setting.layers;
   if (setting.edge_m) value["body_edge_m"] = *setting.edge_m;
   if (setting.refinements > 0) value["refinements"] = setting.refinements;
   return value;

@@ -77,7 +77,7 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
   const job::JobSpec& job = run.job;
   MesherWords words;
   mesh::TetMesh mesh =
-      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}, words) : mesh::read_mesh(job.mesh);
+      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m, setting.layers}, words) : mesh::read_mesh(job.mesh);
   body.mesher_warnings = std::move(words.warnings);
   for (const std::string& warning : body.mesher_warnings) run.log.warn_once(warning);
   for (const std::string& remark : words.remarks) run.log.print(remark);
@@ -152,7 +152,7 @@ bool is_parallel_format(const Run& run) {
 Body make_body(Run& run, const Setting& setting) {
   if (is_parallel_format(run)) return read_in_parallel(run, setting);
   Body body;
-  body.source = run.job.body ? describe(*run.job.body, {setting.nodes, setting.edge_m}) : run.job.mesh.string();
+  body.source = run.job.body ? describe(*run.job.body, {setting.nodes, setting.edge_m, setting.layers}) : run.job.mesh.string();
   run.log.begin("read", body.source);
   mesh::TetMesh mesh;
   std::vector<FixedNode> fixed;

@@ -121,6 +121,7 @@ mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& f
   shapes::ShapeOptions options{.shape = body.shape, .dimensions = body.dimensions, .order = order};
   options.target_nodes = fineness.nodes;
   options.edge_m = fineness.edge_m;
+  options.layers = fineness.layers;
   try {
     return shapes::make_shape(options);
   } catch (const InputError& error) {

@@ -18,6 +18,7 @@ namespace carillon::run {
 struct Fineness {
   std::optional<std::int64_t> nodes;  // mid-side nodes included
   std::optional<double> edge_m;
+  int layers = 1;  // of a known shape, at least
 };
 
 /// The mesher's messages on a mesh.

@@ -136,6 +136,7 @@ eigen::Options make_options(const job::JobSpec& job, const Setting& setting) {
   options.low_hz = job.band_hz[0];
   options.high_hz = job.band_hz[1];
   options.max_modes = find_computed_count(job);
+  options.expected_hz = setting.expected_hz;
   options.tolerance = setting.tolerance;
   options.factorisation = to_eigen(job.factorisation);
   options.method = to_eigen(job.method);

@@ -24,8 +24,8 @@ struct Level {
 };
 
 /// Power of the edge length in the interpolation errors of this mesh: measured against a coarser mesh with `edge_ratio` > 1 times the mean
-/// edge if given, otherwise find_order(), or 2 for T10 bodies with a single layer of elements, which converge slower as long as refinement
-/// keeps one layer. Pure.
+/// edge if given, otherwise find_order(), or 2 for T10 bodies with a single layer of elements (bent ones: 3), which converge slower as long
+/// as refinement keeps one layer. Pure.
 double find_order(const Level& level, const Level* coarser, double edge_ratio);
 
 /// Predicted level on a mesh with edges `edge_ratio` times as long, corrected to the same values as `level`. keeps_geometry: refinement
@@ -40,8 +40,9 @@ struct Corrections {
   std::vector<double> own_cents;  // (m) bar of the mode itself, known by its shape: no longer where others may take its place in the list
   std::vector<double> facet_cents;  // (m) as ErrorBars::facet_cents, around `lambda`; empty: no facets in doubt
   double complete_below = 0.0;      // [rad^2/s^2] modes of the body that are not listed lie above
-  // (m) one mesh: half the mesh's bar (T4: 0.4 of it); two meshes: a quarter (straight T10: an eighth); rough estimates: the mesh's own
-  // interval; uncorrected modes: the mesh's bar; disputed modes: the distance of the two meshes
+  // (m) one mesh: half the mesh's bar (T4: 0.4 of it); two meshes: a quarter (most T10: an eighth, see docs/error-bars.md), up to twice
+  // that where T10 nearly agree; rough estimates: the mesh's own interval; uncorrected modes: the mesh's bar; disputed modes: the distance
+  // of the two meshes
   std::vector<bank::Correction> correction;
 };
 

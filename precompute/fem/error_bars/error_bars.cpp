@@ -73,8 +73,8 @@ void load_displacement(const mesh::LocalMesh& local, const std::vector<std::int3
 }
 
 /// Sums of one block of modes over this rank's elements: error, energy, lumping, change, magnitude, the last two again for the alternative
-/// surface, the error of singular elements, and that of bent ones.
-constexpr int kSums = 9;
+/// surface, the error of singular elements, that of bent ones, and that of tractions on free faces.
+constexpr int kSums = 10;
 using Sums = std::array<DoubleLanes, kSums>;
 
 Sums calc_block(const ElementKernels& kernels, Recovery& recovery, Room& room, job::Mass mass_kind, const DoubleLanes& lambda) {
@@ -102,7 +102,7 @@ Sums calc_block(const ElementKernels& kernels, Recovery& recovery, Room& room, j
   }
   kernels.add_energies(elements, recovery.value_of.data(), values, displacement, room.strains.data(), sums[0], sums[7], sums[8], sums[1]);
   kernels.add_shifts(recovery.shifts, values, displacement, lambda, sums[3], sums[4]);
-  kernels.add_tractions(recovery.tractions, values, sums[0]);
+  kernels.add_tractions(recovery.tractions, values, sums[9]);
   kernels.add_shifts(recovery.doubts, values, displacement, lambda, sums[5], sums[6]);
   for (int m = 0; m < kLanes; ++m) sums[2].lane[m] *= lambda.lane[m];
   return sums;
@@ -183,7 +183,8 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const mesh::LocalMesh&
   for (std::size_t m = 0; m < solution.lambda.size(); ++m) {
     const double* sum = &sums[m * kSums];
     ErrorParts parts;
-    parts.interpolation = sum[0];
+    parts.interpolation = sum[0] + sum[9];
+    parts.tractions = sum[9];
     parts.singular = sum[7];
     parts.bent = sum[8];
     parts.energy = sum[1];

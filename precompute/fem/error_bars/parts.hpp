@@ -17,6 +17,7 @@ struct ErrorParts {
   double interpolation = 0.0;   // energy of the unresolved stress, lambda_h - lambda > 0
   double singular = 0.0;        // its part from elements at inward edges and at rims of fixed faces
   double bent = 0.0;            // its part times the squared curvature rise over the height of the elements (Surface::bend)
+  double tractions = 0.0;       // its part from tractions left on free faces
   double energy = 0.0;          // of the whole mode as summed by the estimate: 1 (0.99 for curved T10)
   double lumping = 0.0;         // of a lumped mass: lambda (consistent) - lambda (lumped)
   double geometry = 0.0;        // lambda (smooth surface) - lambda (surface of the mesh), signed

@@ -195,7 +195,13 @@ mesh::TetMesh make_shape(const ShapeOptions& options) {
     throw InputError(fmt::format("{}: edge {} m; give a positive length", shape.name, *options.edge_m));
   }
   const Dimensions dimensions(shape, options.dimensions);
-  const std::vector<Body> bodies = plan_shape(shape, dimensions, options.order);
+  std::vector<Body> bodies = plan_shape(shape, dimensions, options.order);
+  for (Body& body : bodies) {
+    std::size_t least = 0;
+    for (std::size_t axis = 1; axis < body.lengths.size(); ++axis)
+      if (body.lengths[axis] > 0.0 && body.lengths[axis] < body.lengths[least]) least = axis;
+    body.wanted[least] = std::max(body.wanted[least], options.layers);
+  }
   std::optional<long long> target = options.target_nodes;
   if (!target && !options.edge_m) target = 10000;
   try {

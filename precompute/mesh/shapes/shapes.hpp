@@ -42,6 +42,7 @@ struct ShapeOptions {
   int order = 1;                                  // 1 or 2
   std::optional<long long> target_nodes = {};     // all nodes of the mesh, including mid-side nodes
   std::optional<double> edge_m = {};              // requested edge length
+  int layers = 1;                                 // minimum through the least thickness, if the count permits
 };
 
 /// All shapes: bar, tube, plate, sphere, bowl, box, hollow-box, cylinder, disc, ring, cone.

@@ -25,6 +25,8 @@ void write_setting(eigen::NumberWriter& to, const Setting& setting) {
   to.add(setting.nodes.value_or(0));
   to.add(setting.edge_m.value_or(0));
   to.add(static_cast<std::int64_t>(setting.refinements));
+  to.add(static_cast<std::int64_t>(setting.layers));
+  to.add(setting.expected_hz);
 }
 
 Setting read_setting(eigen::NumberReader& from) {
@@ -36,7 +38,10 @@ Setting read_setting(eigen::NumberReader& from) {
   if (nodes > 0) setting.nodes = nodes;
   if (edge_m > 0) setting.edge_m = edge_m;
   setting.refinements = static_cast<int>(from.get_count(0, 100));
-  if (!(setting.tolerance > 0 && setting.tolerance < 1)) throw InputError("a number in it is out of range");
+  setting.layers = static_cast<int>(from.get_count(1, 100));
+  setting.expected_hz = from.get_double();
+  const bool is_known = setting.tolerance > 0 && setting.tolerance < 1 && setting.expected_hz >= 0;
+  if (!is_known) throw InputError("a number in it is out of range");
   return setting;
 }
 

@@ -106,6 +106,48 @@ def print_corrected(groups):
             )
 
 
+def calc_excess(row):
+    return float(row["interpolation"]) + 4 * float(row["bent"])
+
+
+def read_mesh(rows):
+    """Of the k-th corrected frequency: lambda corrected and of the mesh; the mode's own bar, row, verdict; the error beyond the truth's."""
+    found = []
+    for row in rows:
+        if int(row["corrected_mode"]) >= len(rows):
+            break
+        mode = rows[int(row["corrected_mode"])]
+        excess = min(calc_excess(mode), 0.99)
+        geometry = 1.5 * abs(float(mode["geometry"])) + 0.15 * float(mode["geometry_magnitude"])
+        own = 600 * math.log2(1 + 3.5 * excess / (1 - excess) + geometry)
+        beyond = abs(float(row["corrected_error_cents"])) - float(row["truth_cents"])
+        found.append((float(row["corrected_hz"]) ** 2, float(mode["freq_hz"]) ** 2, own, mode, row["trust"], beyond))
+    return found
+
+
+def print_pairs(groups):
+    """Bars of T10 where two meshes agree: the rule of correct.cpp, k-th against k-th, on each body's two meshes."""
+    meshes = collections.defaultdict(list)
+    for (body, _, element, unknowns), rows in sorted(groups.items(), key=lambda item: item[0][3]):
+        if element in ("T10", "T10 curved"):
+            meshes[body, element].append(read_mesh(rows))
+    counts = {name: [0, 0] for name in ("straight", "curved", "curved, unseen parts", "rough at rims")}
+    is_seen = lambda mode: 4 * float(mode["bent"]) <= 0.05 * calc_excess(mode) and abs(float(mode["geometry"])) <= 0.25 * calc_excess(mode)
+    for (_, element), (coarse, fine, *_) in meshes.items():
+        for (before, mesh_before, _, mode_before, trust_before, _), (now, mesh, own, mode, trust, beyond) in zip(coarse, fine):
+            by, by_before = mesh - now, mesh_before - before
+            is_rim = trust == "2" and calc_excess(mode) <= 0.3
+            if not (trust == "0" or is_rim) or trust_before not in "02" or abs(by_before) < 1.5 * abs(by) or by == by_before:
+                continue
+            apart = abs(before - now) / abs(by_before - by)
+            are_seen = not is_rim and is_seen(mode) and is_seen(mode_before)
+            name = "rough at rims" if is_rim else "straight" if element == "T10" else "curved" if are_seen else "curved, unseen parts"
+            if apart <= 1:
+                counts[name][0] += 1
+                counts[name][1] += beyond <= (0.125 if are_seen else 0.25) * max(1, 2 * apart) * own
+    print("\nTwo meshes, modes within their bars: " + "; ".join(f"{name} {held} of {all}" for name, (all, held) in counts.items()))
+
+
 def draw(groups, file):
     low, high, size, left = -2, 4, 620, 60
     scale = size / (high - low)
@@ -158,5 +200,6 @@ if __name__ == "__main__":
     found = read(sys.argv[1])
     print_table(summarise(found))
     print_corrected(found)
+    print_pairs(found)
     if len(sys.argv) > 2:
         draw(found, sys.argv[2])

@@ -180,11 +180,28 @@ TEST(Sweep, goes_past_a_cluster_too_narrow_to_cut) {
 
 TEST(CutToLowest, keeps_a_few_modes_more_than_wanted) {
   const CountBelow count = [](double x) { return static_cast<std::int64_t>(std::sqrt(x)); };
-  const Slice cut = cut_to_lowest({1, 1, 1e6, 1000}, 40, count);
+  const Slice cut = cut_to_lowest({1, 1, 1e6, 1000}, 40, 0, count);
   EXPECT_EQ(cut.low, 1);
   EXPECT_GE(cut.count(), 40);
   EXPECT_LE(cut.count(), 50);
-  EXPECT_EQ(cut_to_lowest({1, 1, 1e6, 1000}, 999, count).high, 1e6);
+  EXPECT_EQ(cut_to_lowest({1, 1, 1e6, 1000}, 999, 0, count).high, 1e6);
+}
+
+TEST(CutToLowest, takes_one_count_with_a_good_guess_and_ends_right_with_any) {
+  int counts = 0;
+  const CountBelow count = [&](double x) { return ++counts, static_cast<std::int64_t>(std::sqrt(x)); };
+  const auto cut_from = [&](double guess) {
+    counts = 0;
+    return cut_to_lowest({1, 1, 1e6, 1000}, 40, guess, count);
+  };
+  for (const double share : {0.95, 1.0, 1.05}) {  // of the lambda of the 40th
+    EXPECT_LE(std::abs(cut_from(share * 41 * 41).count() - 45), 5) << share;
+    EXPECT_EQ(counts, 1) << share;
+  }
+  for (const double guess : {1e-9, 1.5, 9.0, 400.0, 1e4, 9.9e5, 1e6, 1e9}) {
+    EXPECT_LE(std::abs(cut_from(guess).count() - 45), 5) << guess;
+    EXPECT_LE(counts, 6) << guess;
+  }
 }
 
 }  // namespace

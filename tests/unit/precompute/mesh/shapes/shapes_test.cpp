@@ -9,7 +9,9 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <set>
 
+#include "precompute/mesh/check.hpp"
 #include "tests/support/catch_message.hpp"
 #include "tests/unit/precompute/mesh/shapes/quality.hpp"
 
@@ -127,6 +129,31 @@ TEST(Shapes, node_count) {
       }
     }
   }
+}
+
+TEST(Shapes, layers_through_the_least_thickness) {
+  const std::vector<std::pair<std::string, Values>> bodies{
+      {"plate", {{"length", 0.24}, {"width", 0.16}, {"thickness", 0.003}}},
+      {"disc", {{"radius", 0.06}, {"thickness", 0.0015}}},
+      {"tube", {{"length", 0.12}, {"outer-radius", 0.02}, {"wall", 0.002}}},
+      {"bowl", {{"outer-radius", 0.07}, {"wall", 0.004}}},
+      {"sphere", {{"radius", 0.06}, {"wall", 0.003}}},
+      {"hollow-box", {{"length", 0.09}, {"width", 0.07}, {"height", 0.05}, {"wall", 0.005}}}};
+  for (const auto& [shape, dimensions] : bodies)
+    for (const int layers : {1, 2, 3}) {
+      const ShapeOptions options{.shape = shape, .dimensions = dimensions, .order = 2, .target_nodes = 9000, .layers = layers};
+      const mesh::TetMesh mesh = make_shape(options);
+      EXPECT_NEAR(static_cast<double>(mesh.nodes_m.size()), 9000, 900) << shape;
+      // Layers have vertices inside the wall, which no face of the surface has; one layer has none.
+      const mesh::Surface surface = mesh::extract_boundary(mesh);
+      const std::set<std::int32_t> outer(surface.nodes.begin(), surface.nodes.end());
+      std::set<std::int32_t> corners;
+      for (std::size_t at = 0; at < mesh.tets.size(); at += 10) corners.insert(&mesh.tets[at], &mesh.tets[at] + 4);
+      const auto inside = std::ranges::count_if(corners, [&](std::int32_t node) { return !outer.contains(node); });
+      const double all = static_cast<double>(corners.size());
+      if (layers == 1) EXPECT_EQ(inside, 0) << shape;
+      if (layers > 1) EXPECT_NEAR(static_cast<double>(inside) / all, (layers - 1.0) / (layers + 1.0), 0.12) << shape << " " << layers;
+    }
 }
 
 TEST(Shapes, quadratic_volumes) {

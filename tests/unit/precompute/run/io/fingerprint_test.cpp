@@ -35,6 +35,8 @@ TEST(Setting, is_read_as_it_was_written_and_never_from_less) {
   setting.tolerance = 1e-9;
   setting.edge_m = 0.003;
   setting.refinements = 2;
+  setting.layers = 3;
+  setting.expected_hz = 1234.5;
   eigen::NumberWriter writer;
   write_setting(writer, setting);
   eigen::NumberReader reader(writer.bytes);
@@ -45,6 +47,8 @@ TEST(Setting, is_read_as_it_was_written_and_never_from_less) {
   EXPECT_EQ(back.edge_m, setting.edge_m);
   EXPECT_FALSE(back.nodes);
   EXPECT_EQ(back.refinements, 2);
+  EXPECT_EQ(back.layers, 3);
+  EXPECT_EQ(back.expected_hz, 1234.5);
   for (std::size_t size = 0; size < writer.bytes.size(); ++size) {
     const std::string cut = writer.bytes.substr(0, size);
     eigen::NumberReader less(cut);
