@@ -155,8 +155,12 @@ TEST(Sensitivities, AreDoubtfulNearFixedNodesAndInwardEdgesOnly) {
   const Sensitivities clamped = calc_sensitivities(bank, make_elasticity(0.3), kDensity, 1, fixed);
   for (std::size_t site = 0; site < clamped.site_count(); ++site) {
     const double x = bank.vertices_m[clamped.vertex[site]][0] - example::kCornerM[0];
-    if (x < 1.9 * edge) EXPECT_EQ(clamped.doubtful[site], 1) << x;
-    if (x > 3.1 * edge) EXPECT_EQ(clamped.doubtful[site], 0) << x;
+    if (x < 1.9 * edge) {
+      EXPECT_EQ(clamped.doubtful[site], 1) << x;
+    }
+    if (x > 3.1 * edge) {
+      EXPECT_EQ(clamped.doubtful[site], 0) << x;
+    }
   }
   // An angle: the cross-section turns inwards at (1, 1) cm.
   const std::vector<Vec3> section{{0, 0, 0}, {0.03, 0, 0}, {0.03, 0.01, 0}, {0.01, 0.01, 0}, {0.01, 0.03, 0}, {0, 0.03, 0}};
@@ -179,8 +183,12 @@ TEST(Sensitivities, AreDoubtfulNearFixedNodesAndInwardEdgesOnly) {
   for (std::size_t site = 0; site < angle.site_count(); ++site) {
     const Vec3& x = bank.vertices_m[angle.vertex[site]];
     const double distance = std::hypot(x[0] - 0.01, x[1] - 0.01);
-    if (distance < 1e-9) EXPECT_EQ(angle.doubtful[site], 1);
-    if (distance > 0.02) EXPECT_EQ(angle.doubtful[site], 0);
+    if (distance < 1e-9) {
+      EXPECT_EQ(angle.doubtful[site], 1);
+    }
+    if (distance > 0.02) {
+      EXPECT_EQ(angle.doubtful[site], 0);
+    }
   }
 }
 

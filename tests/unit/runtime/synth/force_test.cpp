@@ -255,7 +255,9 @@ TEST(Force, LatePiecesAreShiftedTogether) {
   const std::vector<Force> first = make_pieces(late), second = make_pieces(other, 1);
   for (std::size_t k = 0; k < first.size(); ++k) {
     ASSERT_TRUE(voice.push(first[k]));
-    if (k < second.size()) ASSERT_TRUE(voice.push(second[k]));
+    if (k < second.size()) {
+      ASSERT_TRUE(voice.push(second[k]));
+    }
   }
   EXPECT_EQ(voice.get_counters().late, 2) << "pulses";
   for (const Course* course : {&late, &other}) {

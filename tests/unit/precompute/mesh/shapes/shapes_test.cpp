@@ -151,8 +151,12 @@ TEST(Shapes, layers_through_the_least_thickness) {
       for (std::size_t at = 0; at < mesh.tets.size(); at += 10) corners.insert(&mesh.tets[at], &mesh.tets[at] + 4);
       const auto inside = std::ranges::count_if(corners, [&](std::int32_t node) { return !outer.contains(node); });
       const double all = static_cast<double>(corners.size());
-      if (layers == 1) EXPECT_EQ(inside, 0) << shape;
-      if (layers > 1) EXPECT_NEAR(static_cast<double>(inside) / all, (layers - 1.0) / (layers + 1.0), 0.12) << shape << " " << layers;
+      if (layers == 1) {
+        EXPECT_EQ(inside, 0) << shape;
+      }
+      if (layers > 1) {
+        EXPECT_NEAR(static_cast<double>(inside) / all, (layers - 1.0) / (layers + 1.0), 0.12) << shape << " " << layers;
+      }
     }
 }
 
