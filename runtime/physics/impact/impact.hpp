@@ -68,7 +68,7 @@ struct Options {
   double settling_s = 3e-3;     // maximum settling time of resting contacts after the others have separated
   double part_s = 0.0;          // time without force that ends the impact; 0: the length of the longest elastic pulse
   bool above_band = true;       // modes above the band of plate-like bodies (modes.hpp)
-  double max_yielded_m = 5e-5;  // compression without force by a limit of the rebound; infinite: bodies and modes get the same force
+  double max_yielded_m = 6e-5;  // compression without force by a limit of the rebound; infinite: bodies and modes get the same force
 };
 
 /// Force on the surface of body a at a contact, as impulses of equal steps; world axes. Rigid bodies may get less while their rebound is

@@ -61,7 +61,7 @@ double Impact::calc_parting(int row) const {
 /// Share of a limit of the rebound that acts on the rigid bodies alone, 0 to 1: it grows with the compression without force.
 double Impact::calc_rigid_share(const History& contact) const {
   const double yielded = std::min(contact.yielded_m / max_yielded_m_, 1.0);
-  return yielded * yielded;
+  return std::pow(yielded, 4);
 }
 
 /// Reduces the normal forces that would make the rigid bodies separate too fast at the end of the step. At first modes and springs lose the
