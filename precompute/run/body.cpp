@@ -76,8 +76,8 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
   const bool quadratic = setting.element == job::Element::T10;
   const job::JobSpec& job = run.job;
   MesherWords words;
-  mesh::TetMesh mesh =
-      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m, setting.layers}, words) : mesh::read_mesh(job.mesh);
+  mesh::TetMesh mesh = job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m, setting.layers}, words)
+                                : mesh::read_mesh(job.mesh);
   body.mesher_warnings = std::move(words.warnings);
   for (const std::string& warning : body.mesher_warnings) run.log.warn_once(warning);
   for (const std::string& remark : words.remarks) run.log.print(remark);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Hard cases of bodies whose modes take part in impacts: random drops of twelve bodies of four materials, solved, rendered and audited by the
-programs. Depth at rest is computed here from the poses of the labels and the vertices of the bank.
+"""Hard cases of bodies whose modes take part in impacts: random drops of twelve bodies of four materials, solved, rendered and audited by
+the programs. Depth of sleeping bodies is computed here from the poses of the labels and the vertices of the bank.
 
 usage: modal_drops.py modal_drops_MATERIAL [--drops N] [--seed N] [--keep FOLDER]
 """

@@ -127,7 +127,7 @@ struct Forces {
   geometry::Place place_a, place_b;
   double time_s = 0.0, step_s = 0.0;
   bool continues = false;
-  bool moves = false;  // the contact has stayed closed since a force at another place
+  bool moves = false;            // the contact has stayed closed since a force at another place
   std::vector<Vec3> on_a, on_b;  // [N s], each in the mesh frame of its body at that time; on_b empty for the ground
 };
 

@@ -34,10 +34,7 @@ WAYS = ("box", "tube", "two")  # with impulses found from velocities, and with e
 WANTED_WAYS = {"found_db": 1.5, "early_db": 1.5}
 # What an engine does not meet, and its bound instead; the reasons are in docs/howto/my-engine.md.
 LIMITS = {
-    "own": {  # a step holds several bounces
-        ("bead", 60): {"windows_db": 6.0},
-        ("bead", 1000): {"windows_db": 4.0},
-    },
+    "own": {("bead", 60): {"windows_db": 6.0}, ("bead", 1000): {"windows_db": 4.0}},  # a step holds several bounces
     "simbody": {("rod", 240): {"windows_db": 4.5}, ("rod", 1000): {"windows_db": 4.0}},
     "bullet": {
         ("slide", 60): {"windows_db": 4.0},
