@@ -258,7 +258,7 @@ inline DropOutcome run_drop(const Drop& d, double seconds) {
 /// Bounds of every drop of a rigid body.
 struct DropBounds {
   double rests_m = 25e-6, ever = 1.0;  // asleep, or in the last 0.2 s; over calc_allowed_depth()
-  double missed_m = 5e-6, gained = 1e-5, lifted = 1e-3;
+  double missed_m = 2e-6, gained = 1e-5, lifted = 1e-3;
 };
 inline constexpr DropBounds kWanted;
 /// Bounds of any drop of the fuzzer. Of 3,562 random drops none came to rest deeper than 25 um or was ever deeper than allowed; eight low
