@@ -6,7 +6,6 @@ usage: cross.py CASE      holds the largest relative difference of a frequency o
 """
 import itertools
 import json
-import os
 import pathlib
 import subprocess
 import sys
@@ -18,22 +17,13 @@ import scipy.io
 import scipy.sparse.linalg
 
 import figure
+from programs import BIN, SPRUCE, STEEL
 
-BIN = pathlib.Path(os.environ.get("CARILLON_BIN_DIR", "build/release/bin")).resolve()
-STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850}
 CERAMIC = {"young_modulus_pa": 5.454e9, "poisson_ratio": 0.33, "density_kg_m3": 2700}
 ALUMINIUM, RUBBER = {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700}, {
     "young_modulus_pa": 10e6,
     "poisson_ratio": 0.4999,
     "density_kg_m3": 1100,
-}
-SPRUCE = {
-    "orthotropic": {
-        "young_modulus_pa": [10.8e9, 0.84e9, 0.46e9],
-        "shear_modulus_pa": [0.69e9, 0.032e9, 0.66e9],
-        "poisson_ratio": [0.372, 0.435, 0.467],
-    },
-    "density_kg_m3": 400,
 }
 DAMPING = {"damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 1}}}
 BUNNY = "/usr/share/glmark2/models/bunny.obj"  # of Debian's glmark2-data

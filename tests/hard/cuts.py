@@ -11,18 +11,10 @@ import numpy as np
 
 import elastic
 from figure import hold, hold_refusal
-from programs import STEEL, Folder
+from programs import SPRUCE, STEEL, Folder
 from solids import Solid, make_box, make_lattice, to_quadratic
 
 CENTS = 600 / np.log(2)  # of a change of ln lambda
-SPRUCE = {
-    "orthotropic": {
-        "young_modulus_pa": [10.8e9, 0.84e9, 0.46e9],
-        "shear_modulus_pa": [0.69e9, 0.032e9, 0.66e9],
-        "poisson_ratio": [0.372, 0.435, 0.467],
-    },
-    "density_kg_m3": 400,
-}
 
 
 def find_elasticity(material):

@@ -12,6 +12,14 @@ import numpy as np
 
 BIN = pathlib.Path(os.environ.get("CARILLON_BIN_DIR", "build/release/bin")).resolve()
 STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850}
+SPRUCE = {
+    "orthotropic": {
+        "young_modulus_pa": [10.8e9, 0.84e9, 0.46e9],
+        "shear_modulus_pa": [0.69e9, 0.032e9, 0.66e9],
+        "poisson_ratio": [0.372, 0.435, 0.467],
+    },
+    "density_kg_m3": 400,
+}
 TIMEOUT_S = 330 * int(os.environ.get("CARILLON_PATIENCE", "1"))  # of one run: a longer run counts as hung
 
 

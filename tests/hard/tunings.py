@@ -159,16 +159,21 @@ def fixed_body():
         hold("fixed_body", np.abs(np.sort(solid.nodes[:, 0])[:45]).max(), 1e-12, "m by which fixed nodes leave their plane")
 
 
+def lower_two(folder, job, by_cents, *words):
+    """The map that lowers the two lowest modes by the given cents."""
+    (folder.path / "probe.json").write_text(json.dumps(job | {"max_modes": 4}))
+    assert folder.run(1, "carillon-precompute", "-q", "probe.json").code == 0
+    with h5py.File(folder.path / "bar.hdf") as bank:
+        body = np.sort(bank["modes/corrected_frequency_hz"][:])
+    wishes = ",".join(f"{hz * 2 ** (-cents / 1200):.6f}" for hz, cents in zip(body, by_cents))
+    return tune(folder, job, "--map", "--hz", wishes, "--modes", "mode 1,mode 2", *words)
+
+
 def sheet_in_one_layer():
     """A plate of 1 mm in one layer, two modes lowered by different cents."""
     with Folder() as folder:
         job = write_bar(folder, [12, 8, 1], [0.2, 0.13, 0.001])
-        (folder.path / "probe.json").write_text(json.dumps(job | {"max_modes": 4}))
-        assert folder.run(1, "carillon-precompute", "-q", "probe.json").code == 0
-        with h5py.File(folder.path / "bar.hdf") as bank:
-            body = np.sort(bank["modes/corrected_frequency_hz"][:])
-        wishes = ",".join(f"{hz * 2 ** (-cents / 1200):.6f}" for hz, cents in zip(body, (30, 10)))
-        done = tune(folder, job, "--map", "--hz", wishes, "--modes", "mode 1,mode 2", "--most", "0.2mm", "--wall", "0.6mm")
+        done = lower_two(folder, job, (30, 10), "--most", "0.2mm", "--wall", "0.6mm")
         hold("sheet_in_one_layer", max(abs(mode["off_cents"]) for mode in done["modes"]), 0.2, "cents off")
         _, solid = hold_mesh("sheet_in_one_layer", folder, STEEL, 4)
         columns = np.unique(np.round(solid.nodes[:, :2], 5), axis=0, return_inverse=True)[1].ravel()
@@ -180,12 +185,7 @@ def pair_to_split():
     """The exactly equal modes of a square bar are to lie 8 cents apart."""
     with Folder() as folder:
         job = write_bar(folder, [16, 4, 4], [0.24, 0.02, 0.02])
-        (folder.path / "probe.json").write_text(json.dumps(job | {"max_modes": 4}))
-        assert folder.run(1, "carillon-precompute", "-q", "probe.json").code == 0
-        with h5py.File(folder.path / "bar.hdf") as bank:
-            body = np.sort(bank["modes/corrected_frequency_hz"][:])
-        wishes = ",".join(f"{hz * 2 ** (-cents / 1200):.6f}" for hz, cents in zip(body, (10, 2)))
-        done = tune(folder, job, "--map", "--hz", wishes, "--modes", "mode 1,mode 2", "--knots", "20")
+        done = lower_two(folder, job, (10, 2), "--knots", "20")
         hold("pair_to_split", max(abs(mode["off_cents"]) for mode in done["modes"]), 0.2, "cents off")
         hz, _ = hold_mesh("pair_to_split", folder, STEEL, 2)
         hold("pair_to_split", abs(1200 * np.log2(hz[1] / hz[0]) - 8), 0.4, "cents between them less 8, by numpy")

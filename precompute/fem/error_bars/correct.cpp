@@ -32,7 +32,7 @@ constexpr double kSingularShare = 0.25;                          // of the estim
 constexpr double kHalf = 0.5, kHalfT4 = 0.4;                     // of the mesh's bar
 constexpr double kAgreed = 0.25, kAgreedT10 = 0.125;             // of the mesh's bar, two meshes; T10: unless walls bend
 constexpr double kAgree = 0.5, kNearlyAgree = 1.0;               // distance of two meshes, of the difference of their corrections
-constexpr double kUnseen = 0.05;                                 // of the estimate: what recovered strains do not show of bent T10
+constexpr double kUnseen = 0.05;                                 // share of the estimate missing in recovered strains of curved T10
 constexpr double kCurved = 0.25;                                 // of the estimate: the surface of curved T10
 constexpr double kApart = 1.5;                                   // of the corrections of two meshes
 constexpr double kOverlaid = 12.0;        // rough: a T4 mode whose bar others make so many times its own; results are the same from 2 to 12
@@ -40,7 +40,7 @@ constexpr double kSameEigenvalue = 1e-6;  // of lambda
 
 double to_cents(double share) { return 600 * std::log2(share); }
 
-/// has_rims: whether rims of fixed faces count.
+/// has_rims: includes rims of fixed faces.
 Correction find_correction(const ErrorParts& parts, const Level& level, bool has_rims) {
   const Kind kind = level.kind;
   if (level.is_lumped && kind != Kind::kT4) return Correction::kLumped;
@@ -166,7 +166,7 @@ Verdict make_verdict(std::vector<Correction> correction) {
   return {std::move(correction), std::vector<double>(count, 0.0), std::vector<double>(count, kAgreed)};
 }
 
-/// Modes of one mesh and what was found about them.
+/// Modes of one mesh with their error estimates.
 struct Seen {
   const Level& level;
   const Corrections& corrections;

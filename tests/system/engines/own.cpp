@@ -27,7 +27,7 @@ class Own : public Engine {
     read_poses();
     return carillon_touches_start(touches_, 0.0, poses_.data(), count_bodies(), message, size);
   }
-  /// To the window that ends nearest to that time; nothing if there is no new one.
+  /// Advances to the nearest end of a window; no points if that is the present time.
   carillon_status step(double time_s, char* message, std::size_t size) override {
     bool has_moved = false;
     for (; space_.get_time() + 0.5 * rigid::Space::kWindow < time_s || !space_.is_at_window(); has_moved = true) {

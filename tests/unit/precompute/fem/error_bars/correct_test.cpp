@@ -191,7 +191,7 @@ TEST(TwoMeshes, that_agree_shorten_the_bar_to_an_eighth) {
     return error_bars::calc_corrections(round, std::span(&before, 1)).cents[0] / error_bars::calc_cents(round.parts[0], round.kind);
   };
   EXPECT_NEAR(find_share(), 0.125, 1e-9) << "flat or thick";
-  before.parts[0].interpolation = 0.8 * 0.16;  // the same excess, a fifth of it for what strains do not show
+  before.parts[0].interpolation = 0.8 * 0.16;  // the same excess, less the share missing in recovered strains
   before.parts[0].bent = 0.05 * 0.16;
   EXPECT_NEAR(find_share(), 0.25, 1e-9) << "a bent wall on the coarser mesh";
   before = coarse;
