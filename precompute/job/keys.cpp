@@ -18,8 +18,7 @@ const base::Keys<JobSpec> kJobKeys{
      "mode shapes in the bank: [packed](../packed-banks.md) with an error of -60 dB(A) if they take 1 MB or more, or unchanged"},
     {"sensitivities", &JobSpec::sensitivities, Limits{0, 1000},
      "number of the lowest modes with [sensitivities](tune-a-body.md#sensitivities) to cuts and constants, up to 8 more if these are "
-     "within 1 % "
-     "of the last; for one material"},
+     "within 1 % of the last; for one material"},
     {"accuracy_cents", &JobSpec::accuracy_cents, Limits{1e-3, 1200},
      "chooses element, mesh size and `solver.tolerance`: [choose-accuracy](choose-accuracy.md)"},
     {"material", "required", "name (`\"steel\"`) or object: [materials](materials.md)"},

@@ -183,9 +183,7 @@ double Search::find_last_hz() const {
 /// No mode of the bank is rough or stiff.
 bool Search::are_reliable() const {
   const error_bars::Corrections& corrections = current_.solved.errors.bars.corrected;
-  return std::ranges::all_of(find_listed(corrections), [&](std::size_t m) {
-    return corrections.correction[m] == bank::Correction::kOneMesh || corrections.correction[m] == bank::Correction::kTwoMeshes;
-  });
+  return std::ranges::all_of(find_listed(corrections), [&](std::size_t m) { return bank::is_reliable(corrections.correction[m]); });
 }
 
 /// One layer of T10 bends with a constant shear through the thickness, however fine it is in the plane, and leaves its traction on the

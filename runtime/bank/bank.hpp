@@ -106,6 +106,8 @@ enum class Correction : std::uint8_t {
 inline constexpr int kCorrectionCount = 6;
 /// True if the frequency differs from the mesh's.
 constexpr bool is_corrected(Correction correction) { return correction <= Correction::kRough; }
+/// True if neither rough, stiff, lumped nor disputed.
+constexpr bool is_reliable(Correction correction) { return correction == Correction::kOneMesh || correction == Correction::kTwoMeshes; }
 /// Short name: "one mesh", "two meshes", "rough", "too stiff", "lumped T10", "disputed".
 const char* describe(Correction correction);
 

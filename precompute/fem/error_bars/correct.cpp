@@ -55,8 +55,6 @@ Correction find_correction(const ErrorParts& parts, const Level& level, bool has
   return Correction::kOneMesh;
 }
 
-bool is_reliable(Correction correction) { return correction == Correction::kOneMesh || correction == Correction::kTwoMeshes; }
-
 /// Of T10: recovered strains show nearly all of the estimate, walls being flat or thick and surfaces well met (a cone's is not near its
 /// tip).
 bool is_seen(const ErrorParts& parts, Kind kind) {
@@ -147,7 +145,7 @@ Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, co
   corrections.complete_below = find_lowest_unlisted(level.lambda, own, level.unlisted);
   if (level.kind == Kind::kT4)  // where bending is octaves too high, the k-th of the list need not be the k-th of the body
     for (std::size_t m = 0; m < parts.size(); ++m)
-      if (is_reliable(corrections.correction[m]) && corrections.cents[m] > kOverlaid * (own.high[m] - own.stated[m]))
+      if (bank::is_reliable(corrections.correction[m]) && corrections.cents[m] > kOverlaid * (own.high[m] - own.stated[m]))
         corrections.correction[m] = Correction::kRough;
   corrections.facet_cents = find_facet_cents(level, own, corrections.cents);
   if (is_too_short(level))
