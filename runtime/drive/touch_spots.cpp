@@ -20,6 +20,7 @@ constexpr double kCreepMS = 1e-3;       // m/s; slower slip is creep of an engin
 constexpr double kSettledS = 0.1;       // s; a position older than this has settled
 constexpr double kSettledRatio = 3.0;   // a hit on a loaded position is above this times its load
 constexpr double kSharedRatio = 2.0;    // an impulse that comes from a hit elsewhere on the body: above this times weight and load
+constexpr double kPassedOnRatio = 0.1;  // of the fastest hit of its bodies: a slower one where they rest comes from it
 constexpr double kDecayedRatio = 0.05;  // of the largest force: the end of a compliant hit
 constexpr double kMatchRatio = 0.2;     // of the size: distance from the last position
 constexpr double kGroupRatio = 0.05;    // of the size: points of one position; corners of an edge that lands are apart
@@ -73,12 +74,16 @@ void TouchSpots::advance(const StepView& step, std::span<const StepPoint> points
                          std::vector<Load>& loads) {
   counters_ = &counters;
   struck_s_.assign(step.bodies.size(), kNever);
+  fastest_.assign(step.bodies.size(), 0.0);
   std::vector<Group> groups = make_groups(step, points);
   for (const Group& g : groups) {
     if (!(g.approach_m_s > step.calc_slowest())) continue;
     const double touch_s = step.scene.before_s + calc_wait_s(step, g.a, g.b, g.stations_m, g.normal, g.gap_m, g.approach_m_s);
-    for (const int body : {g.a, g.b})
-      if (body >= 0) struck_s_[body] = std::min(struck_s_[body], touch_s);
+    for (const int body : {g.a, g.b}) {
+      if (body < 0) continue;
+      struck_s_[body] = std::min(struck_s_[body], touch_s);
+      fastest_[body] = std::max(fastest_[body], g.approach_m_s);
+    }
   }
   for (auto first = groups.begin(); first != groups.end();) {
     const auto last = std::find_if(first, groups.end(), [&](const Group& g) { return g.a != first->a || g.b != first->b; });
@@ -191,8 +196,11 @@ Vec3 TouchSpots::calc_where(const StepView& step, const Group& g, const Spot& sp
 }
 
 /// `count`: positions of the pair in this step, which share its weight.
-void TouchSpots::follow(const StepView& step, const Group& g, int count, Spot& spot, std::vector<FinishedHit>& hits) {
+void TouchSpots::follow(const StepView& step, Group g, int count, Spot& spot, std::vector<FinishedHit>& hits) {
   const double dt = step.dt_s, slowest = step.calc_slowest();
+  // Springs of an engine pass on the begin of a hit: their bodies close a little where they rest.
+  const double fastest = std::max(fastest_[g.a], g.b >= 0 ? fastest_[g.b] : 0.0);
+  if (g.approach_m_s < kPassedOnRatio * fastest && carries(step, spot)) g.approach_m_s = std::min(g.approach_m_s, slowest);
   // Engines solve for the velocities at the end of the step, at the points that they report (get_given()).
   const double parting = dot(step.calc_relative(step.scene.motions, step.get_given(), g.a, g.b, g.stations_m), g.normal);
   double weight = calc_weight(step, g.a, g.b, g.normal) / count;

@@ -70,7 +70,7 @@ class TouchSpots {
 
   std::vector<Group> make_groups(const StepView& step, std::span<const StepPoint> points) const;
   Spot& find_spot(const StepView& step, const Group& group, std::vector<Spot>& spots);
-  void follow(const StepView& step, const Group& group, int count, Spot& spot, std::vector<FinishedHit>& hits);
+  void follow(const StepView& step, Group group, int count, Spot& spot, std::vector<FinishedHit>& hits);
   void open(const StepView& step, const Group& group, double wait_s, double inverse_mass, Spot& spot);
   static FinishedHit make_support(const StepView& step, const Spot& spot);
   static bool carries(const StepView& step, const Spot& spot);
@@ -87,6 +87,7 @@ class TouchSpots {
   std::map<std::pair<int, int>, std::vector<Spot>> spots_;
   std::vector<FinishedHit> held_;  // shared hits, until those that caused them are complete
   std::vector<double> struck_s_;   // per body: first touch in this step; infinity: none
+  std::vector<double> fastest_;    // per body: largest speed of approach in this step [m/s]
   std::uint64_t numbers_ = 0;
   TouchesCounters* counters_ = nullptr;
 };
