@@ -27,6 +27,9 @@ constexpr double kMinImpactSpeed = 5e-3;   // m/s; slower hits are not integrate
 constexpr double kLongestImpactS = 20e-3;  // s
 constexpr double kLongestPulses = 50.0;    // an impact lasts at most this many Hertz times, for the sake of its cost,
 constexpr double kMostSteps = 5e4;         // or steps: its hits may be of very different lengths
+constexpr double kRingingShare = 0.01;     // of the speed of approach: impacts on bodies that ring faster are integrated
+constexpr double kRattleShare = 0.1;       // of that speed where bodies rattle: slower hits are part of it
+constexpr double kLongestRattleS = 0.1;    // s
 constexpr std::size_t kMaxTogether = 4;    // hits of an impact: its cost is cubic in them
 
 /// Energy of the modes of a body after a pulse of this length on it [J]; impulse: mesh axes.
@@ -59,7 +62,7 @@ double HitSounds::Contact::calc_part_j() const {
   return 0.5 * hit.push_n_s * hit.approach_m_s * std::max(kMinElasticShare, 1.0 - restitution);
 }
 
-HitSounds::Contact HitSounds::make_contact(const StepView& step, const FinishedHit& hit) {
+HitSounds::Contact HitSounds::make_contact(const StepView& step, const FinishedHit& hit) const {
   Contact c{.hit = hit, .blow = {.a = hit.a, .b = hit.b, .touch_s = hit.touch_s, .masked_s = hit.touch_s}};
   c.speed_m_s = std::max(hit.approach_m_s, rigid::kMinImpactSpeedMS);
   c.restitution = std::clamp(hit.parting_m_s / c.speed_m_s, 0.0, 1.0);
@@ -85,13 +88,14 @@ HitSounds::Contact HitSounds::make_contact(const StepView& step, const FinishedH
   for (const std::size_t side : {0, 1})
     if (!c.shapes[side].empty())
       c.modal_j += calc_modal_j(*step.bodies[side == 0 ? hit.a : hit.b].modes, c.shapes[side], hit.impulses_n_s[side], c.blow.duration_s);
+  c.ringing_m_s = calc_ringing(step, c, hit.touch_s, true);
   return c;
 }
 
 bool HitSounds::Contact::needs_modes() const {
   const double elastic = 2.0 * mass_kg * speed_m_s / hit.push_n_s;
-  return modal_j * elastic * elastic > kModalShare * 0.5 * mass_kg * speed_m_s * speed_m_s && speed_m_s > kMinImpactSpeed &&
-         hit.approach_m_s > rigid::kMinImpactSpeedMS;
+  return (modal_j * elastic * elastic > kModalShare * 0.5 * mass_kg * speed_m_s * speed_m_s || ringing_m_s > kRingingShare * speed_m_s) &&
+         speed_m_s > kMinImpactSpeed && hit.approach_m_s > rigid::kMinImpactSpeedMS;
 }
 
 void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, LastingContacts& lasting, TouchesCounters& counters,
@@ -105,7 +109,7 @@ void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, Lastin
   });
   impacts_left_ = step.options.max_impacts;
   const double oldest_s = step.scene.before_s - 2.0 * step.options.longest_hit_s;
-  std::erase_if(included_s_, [&](const auto& support) { return support.second < oldest_s; });
+  for (auto* times : {&included_s_, &rattles_s_}) std::erase_if(*times, [&](const auto& spot) { return spot.second < oldest_s; });
   double largest_n_s = 0.0;
   for (const FinishedHit& hit : hits) largest_n_s = std::max(largest_n_s, hit.push_n_s);
   std::vector<const FinishedHit*> heard;
@@ -123,6 +127,13 @@ void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, Lastin
     const auto found = included_s_.find(hit.spot);
     return hit.is_shared && found != included_s_.end() && hit.opened_s < found->second;
   };
+  // Modes hit a position that rattles again and again; an engine knows these hits in part, or not at all.
+  for (std::size_t i = 0; i < heard.size(); ++i) {
+    if (!is_rattling(heard[i]->spot, heard[i]->touch_s)) continue;
+    if (kRattleShare * make_contact(step, *heard[i]).ringing_m_s <= heard[i]->approach_m_s) continue;
+    taken_[i] = 1;
+    ++counters.masked;
+  }
   for (std::size_t first = 0; first < heard.size(); ++first)
     if (taken_[first] == 0 && !is_included(*heard[first])) sound(step, gather(step, heard, first), counters, events);
 }
@@ -169,7 +180,69 @@ void HitSounds::sound(const StepView& step, const std::vector<Contact>& contacts
       for (Vec3& impulse : blow.impulses_n_s) impulse = scale * impulse;
       blow.impulse_n_s *= scale;
     }
-    ++(add_pulses(step.scene, blow, &masks_, events) > 0 ? counters.hits : counters.masked);
+    if (add_pulses(step.scene, blow, &masks_, events) > 0) {
+      ++counters.hits;
+      excite(step, c, blow);
+    } else {
+      ++counters.masked;
+    }
+  }
+}
+
+/// Sum over the modes of both bodies of their amplitudes at a contact along its normal: speed [m/s], or swing [m].
+double HitSounds::calc_ringing(const StepView& step, const Contact& c, double time_s, bool is_speed) const {
+  double sum = 0.0;
+  for (const std::size_t side : {0, 1}) {
+    const int body = side == 0 ? c.hit.a : c.hit.b;
+    if (c.shapes[side].empty()) continue;
+    const Ringing& ringing = ringing_[static_cast<std::size_t>(body)];
+    const std::vector<double>&omega = step.bodies[body].modes->get_omega(), &decay = step.bodies[body].given.bank->decay_per_s;
+    const Vec3 normal = turn_back(c.hit.before[side].rotation, c.hit.normal);
+    for (std::size_t m = 0; m < ringing.q.size(); ++m) {
+      if (!(omega[m] > 0.0)) continue;
+      const double* phi = &c.shapes[side][3 * m];
+      sum += std::abs(phi[0] * normal[0] + phi[1] * normal[1] + phi[2] * normal[2]) *
+             std::hypot(ringing.q[m], ringing.q_dot[m] / omega[m]) * (is_speed ? omega[m] : 1.0) *
+             std::exp(-decay[m] * std::max(0.0, time_s - ringing.time_s));
+    }
+  }
+  return sum;
+}
+
+/// Until the surfaces swing less than bodies may sink at a contact after an impact that ends at `time_s`; the swing decays exponentially.
+double HitSounds::find_rattle_end(const StepView& step, const Contact& c, double time_s) const {
+  const double first = calc_ringing(step, c, time_s, false) / rigid::kMaxDepthM;
+  if (!(first > 1.0)) return time_s;
+  const double last = calc_ringing(step, c, time_s + kLongestRattleS, false) / rigid::kMaxDepthM;
+  return time_s + kLongestRattleS * (last < 1.0 ? std::log(first) / std::log(first / last) : 1.0);
+}
+
+/// Modal state at a time.
+HitSounds::Ringing& HitSounds::find_ringing(const StepView& step, int body, double time_s) {
+  Ringing& ringing = ringing_[static_cast<std::size_t>(body)];
+  if (ringing.time_s > time_s + kLongestImpactS) ringing = {};  // the time was set back
+  if (time_s > ringing.time_s) {
+    if (!ringing.q.empty()) step.bodies[body].modes->move_freely(ringing.q, ringing.q_dot, time_s - ringing.time_s);
+    ringing.time_s = time_s;
+  }
+  return ringing;
+}
+
+/// Adds a pulse to the modal states of its bodies.
+void HitSounds::excite(const StepView& step, const Contact& c, const Blow& blow) {
+  for (const std::size_t side : {0, 1}) {
+    if (c.shapes[side].empty()) continue;
+    const int body = side == 0 ? blow.a : blow.b;
+    const std::vector<double>& omega = step.bodies[body].modes->get_omega();
+    Ringing& ringing = find_ringing(step, body, blow.touch_s + 0.5 * blow.duration_s);
+    ringing.q.resize(omega.size());
+    ringing.q_dot.resize(omega.size());
+    const Vec3& impulse = blow.impulses_n_s[side];
+    for (std::size_t m = 0; m < omega.size(); ++m) {
+      const double* phi = &c.shapes[side][3 * m];
+      ringing.q_dot[m] += (phi[0] * impulse[0] + phi[1] * impulse[1] + phi[2] * impulse[2]) *
+                          std::sqrt(impact::calc_pulse_spectrum(omega[m] * blow.duration_s));
+    }
   }
 }
 
@@ -186,11 +259,9 @@ impact::Body HitSounds::make_body(const StepView& step, int index, const Motion&
   body.spin_rad_s = before.spin_rad_s;
   if (!has_modes) return body;
   body.modes = given.modes.get();
-  Ringing& ringing = ringing_[static_cast<std::size_t>(index)];
-  if (ringing.time_s > touch_s + kLongestImpactS) ringing = {};  // the time was set back
+  const Ringing& ringing = find_ringing(step, index, touch_s);
   body.q = ringing.q;
   body.q_dot = ringing.q_dot;
-  if (!body.q.empty()) body.modes->move_freely(body.q, body.q_dot, std::max(0.0, touch_s - ringing.time_s));
   return body;
 }
 
@@ -348,6 +419,7 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits
   if (scale < largest) ++counters.limited;
   counters.impacts += std::ssize(hits);
   for (const Contact& c : std::span(contacts).subspan(hits.size())) included_s_[c.hit.spot] = first.end_s;
+  for (const Contact& c : contacts) rattles_s_[c.hit.spot] = find_rattle_end(step, c, touch_s + impact->get_time());
   for (std::size_t i = 0; i < contacts.size(); ++i) add_forces(step, contacts[i], touch_s, i, pulses, scale, events);
   return true;
 }

@@ -28,15 +28,27 @@ class HitSounds {
   /// Sounds the hits of a step, strongest first. Appends events and notifies `lasting`.
   void add(const StepView& step, std::vector<FinishedHit>& hits, LastingContacts& lasting, TouchesCounters& counters,
            std::vector<events::Event>& events);
+  /// True while ringing bodies rattle at a position after an impact there: nothing rests on it.
+  bool is_rattling(std::uint64_t spot, double time_s) const {
+    const auto found = rattles_s_.find(spot);
+    return found != rattles_s_.end() && time_s < found->second;
+  }
 
  private:
+  /// Modal state of a body after its last hit; empty: at rest.
+  struct Ringing {
+    std::vector<double> q, q_dot;
+    double time_s = 0.0;
+  };
+
   /// A hit and the properties of its pulse.
   struct Contact {
     const FinishedHit& hit;
     double mass_kg = 0.0, speed_m_s = 0.0, restitution = 0.0, radius_m = 0.0, compliance = 0.0;
     Blow blow{};                                  // the hit as a Hertz pulse,
     double modal_j = 0.0;                         // and the energy it would give to the modes
-    std::array<std::vector<double>, 2> shapes{};  // (n, 3) at the places of the blow; empty: no modes
+    std::array<std::vector<double>, 2> shapes{};  // (n, 3) at the places of the blow, mesh axes; empty: no modes
+    double ringing_m_s = 0.0;                     // speed of the surfaces by earlier hits, amplitudes added
 
     /// Kinetic energy lost [J], at least 1 % of the blow.
     double calc_lost_j() const;
@@ -46,13 +58,11 @@ class HitSounds {
     bool needs_modes() const;
   };
 
-  /// Modal state of a body after its last impact; empty: at rest.
-  struct Ringing {
-    std::vector<double> q, q_dot;
-    double time_s = 0.0;
-  };
-
-  static Contact make_contact(const StepView& step, const FinishedHit& hit);
+  Contact make_contact(const StepView& step, const FinishedHit& hit) const;
+  double calc_ringing(const StepView& step, const Contact& contact, double time_s, bool is_speed) const;
+  double find_rattle_end(const StepView& step, const Contact& contact, double time_s) const;
+  Ringing& find_ringing(const StepView& step, int body, double time_s);
+  void excite(const StepView& step, const Contact& contact, const Blow& blow);
   std::vector<Contact> gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first);
   void sound(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
   static double calc_rigid_push(const StepView& step, std::span<const Contact> contacts);
@@ -66,7 +76,8 @@ class HitSounds {
   std::vector<char> taken_;  // per hit of the step: part of an impact already
   Masks masks_{0};
   std::vector<Ringing> ringing_;                // per body
-  std::map<std::uint64_t, double> included_s_;  // by position: end of the last hit whose impact included it as a support
+  std::map<std::uint64_t, double> included_s_;  // by position: end of the last hit whose impact included it as a support,
+  std::map<std::uint64_t, double> rattles_s_;   // and end of its rattling
   int impacts_left_ = 0;
 };
 

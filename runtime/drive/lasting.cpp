@@ -73,6 +73,7 @@ LastingContacts::Group LastingContacts::make_group(const Scene& scene, std::span
     g.curvature_per_m += load.push_n * load.curvature_per_m;
     g.slip_share = std::max(g.slip_share, load.slip_share);
     g.smooth = g.smooth || load.smooth;
+    g.rattles = g.rattles || load.rattles;
     g.features += scramble(load.feature);  // independent of the order
   }
   g.where = (1.0 / g.push_n) * g.where;
@@ -145,7 +146,7 @@ void LastingContacts::record(const Scene& scene, const Group& g, Spot& spot, std
     c.other_sweep_m_s = side == 0 ? sweep_b : sweep_a;
     c.spin_rad_s = norm(g.turn);
     c.patch_radius_m = patch;
-    c.impedance_n_s_m = calc_impedance(scene.get_matter(other), patch);
+    c.impedance_n_s_m = g.rattles ? 0.0 : calc_impedance(scene.get_matter(other), patch);
     spot.last[side] = c;
     events.push_back(c);
   }
@@ -264,6 +265,7 @@ void LastingContacts::end_or_keep(const Scene& scene, std::vector<Spot>& spots, 
         c.slip_m_s = {};
         c.sweep_m_s = c.other_sweep_m_s = c.spin_rad_s = 0.0;
         c.force_n = spot.load_n;
+        c.impedance_n_s_m = calc_impedance(scene.get_matter(c.other), c.patch_radius_m);
         events.push_back(c);
       }
     }

@@ -22,6 +22,7 @@ struct Load {
   double curvature_per_m = 0.0;  // of both surfaces
   double slip_share = 1.0;       // share of the slip that is motion, not solver jitter
   bool smooth = false;           // the point moves over a curved surface
+  bool rattles = false;          // the surfaces part again and again: their contact damps no modes
   std::uint64_t feature = 0;     // of the surfaces; constant while the same ones touch
   std::uint64_t spot = 0;        // identity of the position, if known; 0: by nearness
 };
@@ -46,7 +47,7 @@ class LastingContacts {
     Vec3 where{}, normal{}, turn{};
     Vec3 carried{};  // velocity of the surface that owns the loaded points
     double push_n = 0.0, curvature_per_m = 0.0, slip_share = 0.0;
-    bool smooth = false;
+    bool smooth = false, rattles = false;
     std::uint64_t features = 0;  // hash of the loaded features
     std::uint64_t spot = 0;
   };

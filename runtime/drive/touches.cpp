@@ -267,6 +267,7 @@ bool Touches::Course::step(double time_s, std::span<const TouchesPose> poses, st
     for (const int body : {hit.a, hit.b})
       if (body >= 0) stirred_[body] = 2;
   sounds_.add(view, hits_, lasting_, counters_, events_);
+  for (Load& load : loads_) load.rattles = sounds_.is_rattling(load.spot, scene_.time_s);
   lasting_.update(scene_, loads_, true, events_);
   counters_.touches = lasting_.count_begun();
   add_motions(scene_.time_s - moved_s_ >= kMotionS - 1e-9);

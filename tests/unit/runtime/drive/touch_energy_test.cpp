@@ -60,5 +60,29 @@ TEST(TouchEnergy, BlowsOnARingingPlateAddNoMoreThanTheirOwn) {
   }
 }
 
+/// A slow hit on a thick plate is a Hertz pulse; on one that a fast one has left ringing, it is integrated.
+TEST(TouchEnergy, SlowHitsOnARingingPlateAreIntegrated) {
+  const double thickness = 20e-3;
+  const bank::Bank plate = physics::tests::make_plate_bank(0.2, thickness, 8000.0, 8, 1.0);
+  for (const double wait_s : {1e-3, 20.0}) {  // until it is silent
+    Rig rig({.max_impacts = 8, .ground_restitution = 0.5});
+    rig.add(plate, "plate", {0, 0, 0.5 * thickness}, {}, 0.5);
+    rig.start();
+    const auto strike = [&](double speed, double after_s) {
+      const double impulse = 1.5 * speed * plate.rigid.mass_kg;
+      rig.poses[0].velocity_m_s[2] = -speed;
+      rig.step(after_s, {});
+      rig.poses[0].velocity_m_s[2] = 0.5 * speed;
+      rig.step(1e-4, {on_ground(0, {0, 0, 0}, impulse)});
+    };
+    strike(1.0, 1e-4);
+    ASSERT_EQ(rig.touches.get_counters().impacts, 0) << "modes take little of it";
+    strike(0.02, wait_s);
+    for (int n = 0; n < 300; ++n) rig.step(1e-4, {});
+    EXPECT_EQ(rig.touches.get_counters().hits, 2);
+    EXPECT_EQ(rig.touches.get_counters().impacts, wait_s < 1.0 ? 1 : 0);
+  }
+}
+
 }  // namespace
 }  // namespace carillon::drive::tests

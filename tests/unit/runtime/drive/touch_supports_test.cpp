@@ -10,8 +10,8 @@ namespace {
 constexpr double kThickness = 2e-3, kHalf = 0.1, kStep = 1e-3, kSpeed = 1.0, kMass = 0.02;
 
 /// A plate on its four corners, and a ball of steel above its middle that strikes it after 0.1 s, if `gap_m` is 0. The engine's plate is
-/// rigid: the ground has all of the blow in the same step, as pushes of points that did not close.
-void strike_resting_plate(Rig& rig, const bank::Bank& plate, bool is_supported) {
+/// rigid: the ground has all of the blow in the same step, as pushes of points that did not close, or closed at `sinks_m_s`. 0.15 s follow.
+void strike_resting_plate(Rig& rig, const bank::Bank& plate, bool is_supported, double sinks_m_s = 0.0) {
   rig.add(plate, "plate", {0, 0, 0.5 * kThickness});
   const int ball = rig.touches.add(
       {.body = -1, .name_hash = 7, .mass_kg = kMass, .young_pa = 2e11, .poisson = 0.3, .density_kg_m3 = 7800.0, .size_m = 0.02});
@@ -20,13 +20,17 @@ void strike_resting_plate(Rig& rig, const bank::Bank& plate, bool is_supported) 
   const double weight = plate.rigid.mass_kg * kGravity * kStep, blow = 1.5 * kSpeed * kMass;
   const Vec3 half{kHalf, kHalf, 0.0};
   const auto carry = [&](double impulse) { return is_supported ? on_four_corners(0, {}, half, impulse) : std::vector<TouchPoint>{}; };
-  for (int n = 0; n < 100; ++n) rig.step(kStep, carry(weight));
+  for (int n = 0; n < 100; ++n) {
+    if (n == 99) rig.poses[0].velocity_m_s[2] = -sinks_m_s;
+    rig.step(kStep, carry(weight));
+  }
   ASSERT_FALSE(rig.has_hits());
   std::vector<TouchPoint> points = carry(weight + blow);
+  rig.poses[0].velocity_m_s = {};
   points.push_back({.a = ball, .b = 0, .point_m = {0, 0, kThickness}, .normal = {0, 0, 1}, .impulse_n_s = blow, .friction_n_s = {0, 0, 0}});
   rig.poses[1].velocity_m_s[2] = 0.5 * kSpeed;
   rig.step(kStep, points);
-  for (int n = 0; n < 20; ++n) rig.step(kStep, carry(weight));
+  for (int n = 0; n < 150; ++n) rig.step(kStep, carry(weight));
   EXPECT_TRUE(rig.faults.empty());
 }
 
@@ -38,10 +42,12 @@ std::map<std::int32_t, double> sum_upwards(const Rig& rig) {
   return sums;
 }
 
-TEST(TouchSupports, GroundPushesTheCornersOfAStruckPlate) {
+class StruckPlate : public testing::TestWithParam<double> {};
+
+TEST_P(StruckPlate, IsPushedByTheGroundAtItsCorners) {
   const bank::Bank plate = physics::tests::make_plate_bank(2.0 * kHalf, kThickness, 8000.0, 8, 1.0);
   Rig rig;
-  strike_resting_plate(rig, plate, true);
+  strike_resting_plate(rig, plate, true, GetParam());
   EXPECT_TRUE(rig.list<events::Impulse>().empty()) << "pushes that pass on the blow are in its impact";
   EXPECT_EQ(rig.touches.get_counters().impacts, 1);
   const std::map<std::int32_t, double> corners = sum_upwards(rig);
@@ -54,6 +60,33 @@ TEST(TouchSupports, GroundPushesTheCornersOfAStruckPlate) {
   ASSERT_NE(by_ball, forces.end());
   for (const auto& force : forces) EXPECT_GE(force.time_s, by_ball->time_s);
   EXPECT_LE(calc_modal_j(rig, plate, 0), 0.76 * 0.5 * kMass * kSpeed * kSpeed);
+}
+
+INSTANTIATE_TEST_SUITE_P(SinkingAtTheBlow, StruckPlate, testing::Values(0.0, 0.02));
+
+/// While a plate rattles its supports damp no modes; their contacts last. They damp again when it has decayed.
+TEST(TouchSupports, RattlingContactsDampNothing) {
+  for (const double decay_per_s : {1.0, 100.0}) {
+    const bank::Bank plate = physics::tests::make_plate_bank(2.0 * kHalf, kThickness, 8000.0, 8, decay_per_s);
+    Rig rig;
+    strike_resting_plate(rig, plate, true);
+    const double struck_s = 0.1, rattle_s = decay_per_s > 10.0 ? 0.02 : 0.1;
+    int rattling = 0, begun = 0, ended = 0;
+    for (const auto& contact : rig.list<events::LastingContact>()) {
+      begun += contact.state == events::ContactState::kBegin;
+      ended += contact.state == events::ContactState::kEnd;
+      const double since_s = contact.time_s - struck_s;
+      if (since_s < 0.0 || since_s > rattle_s + 0.01) {
+        EXPECT_GT(contact.impedance_n_s_m, 0.0) << since_s;
+      } else if (since_s > 2e-3 && since_s < 0.5 * rattle_s) {
+        EXPECT_EQ(contact.impedance_n_s_m, 0.0) << since_s;
+        ++rattling;
+      }
+    }
+    EXPECT_GT(rattling, 4);
+    EXPECT_EQ(begun, 4);
+    EXPECT_EQ(ended, 0);
+  }
 }
 
 TEST(TouchSupports, PlateInTheAirHasNone) {
