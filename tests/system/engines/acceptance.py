@@ -34,25 +34,9 @@ WAYS = ("box", "tube", "two")  # with impulses found from velocities, and with e
 WANTED_WAYS = {"found_db": 1.5, "early_db": 1.5}
 # What an engine does not meet, and its bound instead; the reasons are in docs/howto/my-engine.md.
 LIMITS = {
-    "own": {("bead", 60): {"windows_db": 6.0}, ("bead", 1000): {"windows_db": 4.0}},  # a step holds several bounces
-    "simbody": {("rod", 240): {"windows_db": 4.5}, ("rod", 1000): {"windows_db": 4.0}},
-    "bullet": {
-        ("slide", 60): {"windows_db": 4.0},
-        ("pile", 60): {"windows_db": 4.0},
-        ("pile", 1000): {"windows_db": 4.0},
-        ("rod", 1000): {"windows_db": 5.0},
-        ("bead", 240): {"windows_db": 7.0},
-        ("bead", 1000): {"windows_db": 6.5},
-    },
-    "impacts": {("drop", 60): {"windows_db": 5.0}},
-    "mujoco": {
-        ("tube", 240): {"windows_db": 3.5},
-        ("pile", 60): {"windows_db": 4.0},
-        ("rod", 1000): {"windows_db": 4.0},
-        ("bead", 60): {"windows_db": 6.5},
-        ("bead", 240): {"windows_db": 6.5},
-        ("bead", 1000): {"first_db": 4.5, "windows_db": 6.5},
-    },
+    "simbody": {("rod", 240): {"windows_db": 4.0}, ("rod", 1000): {"windows_db": 3.5}},
+    "bullet": {("slide", 60): {"windows_db": 3.75}, ("pile", 60): {"windows_db": 3.5}, ("rod", 1000): {"windows_db": 4.5}},
+    "mujoco": {("pile", 60): {"windows_db": 3.5}, ("rod", 60): {"windows_db": 4.0}, ("rod", 1000): {"windows_db": 3.5}},
 }
 LEFT_OUT = {
     "simbody": ("pile", "bead"),  # its contact of boxes needs meshes, which cost 10 CPU s per s

@@ -7,14 +7,14 @@ import subprocess
 import numpy as np
 
 FRICTION, RESTITUTION = 0.4, 0.5  # of every body
-THROWN = ("box", "tube", "two", "pile", "bar", "slap", "rod", "bead", "drop")
-STARTS_M = (0.001, -0.001)  # offsets of further starts of thrown bodies: single bounces are chaotic,
-MORE_STARTS_M = (*STARTS_M, 0.002, -0.002)  # those of the tube and the pile more than others
+CHAOTIC = ("box", "tube", "two", "pile", "bar", "slap", "rod", "row", "bead", "drop")
+STARTS_M = (0.001, -0.001)  # offsets of further starts: single bounces are chaotic,
+MORE_STARTS_M = (*STARTS_M, 0.002, -0.002)  # those of these three more than others
 
 
 def get_starts(name):
     """Offsets of the further starts of a scene [m]."""
-    return () if name not in THROWN else MORE_STARTS_M if name in ("tube", "pile") else STARTS_M
+    return () if name not in CHAOTIC else MORE_STARTS_M if name in ("tube", "pile", "row") else STARTS_M
 
 
 BOX, BALL, TUBE = [0.06, 0.04, 0.025], [0.03, 0.03, 0.03], [0.075, 0.02, 0.02]
@@ -62,9 +62,9 @@ def solve_banks(programs, folder):
         run(programs / "carillon-precompute", "-q", file.name, cwd=folder)
 
 
-def place(name, kind, half, position, turns=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0), lies=False):
-    """A body; turns in degrees about the fixed axes x, y, z. `lies`: it starts on the ground, not raised by STARTS_M."""
-    return dict(name=name, kind=kind, half=half, position=position, turns=turns, velocity=velocity, spin=spin, lies=lies)
+def place(name, kind, half, position, turns=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0), moved=(0, 0, 1)):
+    """A body; turns in degrees about the fixed axes x, y, z. `moved`: direction in which further starts move it."""
+    return dict(name=name, kind=kind, half=half, position=position, turns=turns, velocity=velocity, spin=spin, moved=moved)
 
 
 def make_pile(count, spread):
@@ -76,7 +76,7 @@ def make_pile(count, spread):
     return boxes
 
 
-ROW = (("a", -0.2, 0.6), ("b", 0.0, 0.0), ("c", 0.061, 0.0))  # name, place [m], speed [m/s]
+ROW = (("a", -0.2, 0.6, (1, 0, 0)), ("b", 0.0, 0.0, (0, 0, 0)), ("c", 0.061, 0.0, (0, 0, 0)))  # name, place [m], speed [m/s], moved
 
 # Name: seconds and bodies.
 SCENES = {
@@ -90,8 +90,8 @@ SCENES = {
     "bar": (4, [place("bar", "bar", BAR, (0, 0, 0.25), (0, 75, 0), velocity=(0.2, 0, 0))]),
     "slap": (3, [place("pane", "pane", PANE, (0, 0, 0.11), (0, 25, 0))]),
     "rod": (2, [place("rod", "rod", ROD, (0, -0.3, 0.1), (0, 12, 0), velocity=(0, 0.3, 0))]),
-    "row": (1, [place(name, "ball", BALL, (x, 0, 0.03), velocity=(v, 0, 0), spin=(0, v / 0.03, 0)) for name, x, v in ROW]),
-    "bead": (2, [place("pane", "pane", PANE, (0, 0, 0.002), lies=True), place("bead", "bead", BEAD, (0.045, 0.03, 0.2))]),
+    "row": (1, [place(n, "ball", BALL, (x, 0, 0.03), velocity=(v, 0, 0), spin=(0, v / 0.03, 0), moved=m) for n, x, v, m in ROW]),
+    "bead": (2, [place("pane", "pane", PANE, (0, 0, 0.002), moved=(0, 0, 0)), place("bead", "bead", BEAD, (0.045, 0.03, 0.2))]),
     "drop": (1, [place("ball", "ball", BALL, (0, 0, 0.2), spin=(0, 10, 0))]),
 }
 
@@ -195,24 +195,24 @@ def count_lost(programs, folder, engine, name, hz):
     return read_counters(output)["lost"]
 
 
-def raise_bodies(bodies, height_m):
-    return [b if b["lies"] else {**b, "position": (*b["position"][:2], b["position"][2] + height_m)} for b in bodies]
+def move_bodies(bodies, offset_m):
+    return [{**b, "position": tuple(x + offset_m * m for x, m in zip(b["position"], b["moved"]))} for b in bodies]
 
 
 def render_own(programs, folder, name):
-    """Sounds of a scene by our own contact: of its start, and of the further starts of a thrown one."""
+    """Sounds of a scene by our own contact: of its start, and of the further ones."""
     seconds, bodies = SCENES[name]
     sounds = []
-    for height_m in (0.0, *get_starts(name)):
-        write_scene(folder / f"{name}.json", 0.5 if sounds else seconds, raise_bodies(bodies, height_m))
+    for offset_m in (0.0, *get_starts(name)):
+        write_scene(folder / f"{name}.json", 0.5 if sounds else seconds, move_bodies(bodies, offset_m))
         sounds.append(render(programs, folder, name))
     return sounds
 
 
-def play(programs, folder, engine, name, hz, height_m=0.0, seconds=None, way="given"):
+def play(programs, folder, engine, name, hz, offset_m=0.0, seconds=None, way="given"):
     """Counters and sound of an engine's scene."""
     whole, bodies = SCENES[name]
-    seconds, bodies = seconds or whole, raise_bodies(bodies, height_m)
+    seconds, bodies = seconds or whole, move_bodies(bodies, offset_m)
     write_scene(folder / f"{name}.json", seconds, bodies)
     words = [hz, seconds, "contacts.jsonl", "-", 8, way]
     output = run(programs / f"engine_{engine}", *words, cwd=folder, input=format_solids(bodies))
@@ -265,8 +265,8 @@ def compare(programs, folder, engine, name, hz, own):
     peak, centroid = find_first_hit(sound)
     own_peak, own_centroid = find_first_hit(own[0])
     windows = find_differences(sound, own[0])
-    for height_m, other in zip(get_starts(name), own[1:]):
-        windows += find_differences(play(programs, folder, engine, name, hz, height_m, 0.5)[1], other)
+    for offset_m, other in zip(get_starts(name), own[1:]):
+        windows += find_differences(play(programs, folder, engine, name, hz, offset_m, 0.5)[1], other)
     return {
         **counters,
         "first_db": 20 * math.log10(peak / own_peak),
