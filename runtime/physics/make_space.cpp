@@ -9,11 +9,15 @@
 #include <stdexcept>
 #include <utility>
 
+#include "runtime/bank/surface.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/physics/check.hpp"
 
 namespace carillon::physics {
 namespace {
+
+constexpr double kSoftSpeedMS = 300.0;  // m/s; sound in bars of soft materials, such as rubber, is slower
+constexpr double kMaxBendRatio = 0.25;  // of the thickness: deflection by a blow that is still integrated with the modes
 
 /// Stops of a joint: one at each end of its travel.
 void add_stops(const JointSpec& j, const std::vector<rigid::Solid>& solids, const std::vector<rigid::State>& states, rigid::Links& links) {
@@ -89,10 +93,15 @@ rigid::Solid SolidMaker::make(const BodySpec& b) {
   solid.young_modulus_pa = b.bank->material.young_modulus_pa;
   solid.poisson_ratio = b.bank->material.poisson_ratio;
   if (has_modes_) solid.modes = modes_.find(*b.bank);
-  if (solid.modes)
+  if (solid.modes) {
     solid.find_shape = [bank = b.bank](const geometry::Place& place) {
       return bank::calc_shapes(*bank, place.triangle, place.barycentric);
     };
+    const bank::Material& material = b.bank->material;
+    const double thickness_m = bank::calc_thickness_m(b.bank->vertices_m, b.bank->triangles, b.bank->rigid.volume_m3);
+    if (material.young_modulus_pa < kSoftSpeedMS * kSoftSpeedMS * material.density_kg_m3 && thickness_m > 0.0)
+      solid.max_bend_m = kMaxBendRatio * thickness_m;
+  }
   return solid;
 }
 

@@ -126,7 +126,14 @@ void Sounding::add_spot(std::span<const rigid::Hit* const> hits, const rigid::St
     blow.places[side] = known && hits.size() == 1 ? *known : scene_.find_place(body, where, (-sign) * normal, first.triangles[side]);
     blow.impulses_n_s[side] = transpose(scene_.motions[body].rotation) * (sign * impulse);
   }
-  (void)drive::add_pulses(scene_, blow, masks_ ? &*masks_ : nullptr, events);
+  const auto scale = [](drive::Blow part, double share, double stretch) {
+    part.impulse_n_s *= share;
+    for (Vec3& impulse : part.impulses_n_s) impulse = share * impulse;
+    part.duration_s *= stretch;
+    return part;
+  };
+  for (const auto& [share, stretch] : {std::pair(strike.first_share, 1.0), std::pair(1.0 - strike.first_share, strike.stretch)})
+    if (share > 0.0) (void)drive::add_pulses(scene_, scale(blow, share, stretch), masks_ ? &*masks_ : nullptr, events);
 }
 
 void Sounding::add(const rigid::Forces& forces, std::vector<events::Event>& events) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -33,7 +34,8 @@ struct Solid {
   double radius_m = 0.0;  // of a ball about the centre that encloses the body
   double restitution = 0.5, friction = 0.4;
   double young_modulus_pa = 0.0, poisson_ratio = 0.0;
-  std::shared_ptr<const impact::Modes> modes;  // null: no modes
+  std::shared_ptr<const impact::Modes> modes;                   // null: no modes
+  double max_bend_m = std::numeric_limits<double>::infinity();  // of soft bodies: blows that bend them farther are rigid
   /// (n, 3) mode shapes at a point of the surface, mesh axes [1/sqrt(kg)]. Set if there are modes.
   std::function<std::vector<double>(const geometry::Place&)> find_shape;
 };

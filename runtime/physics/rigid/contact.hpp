@@ -106,6 +106,7 @@ struct Hit {
   double approach_m_s = 0.0, restitution = 0.0;
   Vec3 impulse{};                                          // on a [N s]
   bool is_cord = false;                                    // a cord becoming taut
+  bool bends = false;                                      // a body too far for a modal impact
   double linked_mass_kg = 0.0;                             // effective mass at the point, for bodies on joints
   std::array<std::optional<geometry::Place>, 2> places{};  // on a and b, if already searched
   std::array<std::int32_t, 2> triangles{-1, -1};           // candidate triangles
@@ -119,6 +120,8 @@ struct Strike {
   std::vector<int> bodies;
   std::vector<State> before, after;
   double modes_j = 0.0;  // transferred to modes
+  // Pulses on bodies that bend far: the first with the length of Hertz and this share of the impulse, the rest prolonged.
+  double first_share = 1.0, stretch = 1.0;
 };
 
 /// Force of one contact of a modal impact, as impulses of equal steps; long ones are delivered in pieces.

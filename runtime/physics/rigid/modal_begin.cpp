@@ -28,6 +28,13 @@ std::vector<double> project(std::span<const double> shape, const Vec3& along) {
   return phi;
 }
 
+/// Bound of the displacement by modes with these shape values and amplitudes.
+double calc_displacement(const std::vector<double>& phi, const std::vector<double>& amplitudes) {
+  double sum = 0.0;
+  for (std::size_t m = 0; m < phi.size(); ++m) sum += std::abs(phi[m]) * amplitudes[m];
+  return sum;
+}
+
 impact::Spring make_spring(const Bodies& bodies, const Hit& hit) {
   return {.stiffness =
               impact::calc_hertz_stiffness(bodies.calc_compliance(hit.a, hit.b), bodies.calc_contact_radius(hit.touch, hit.a, hit.b))};
@@ -48,17 +55,15 @@ ModalImpact* ModalImpacts::find_own(const Step& step, const Hit& hit) {
 }
 
 bool ModalImpacts::predict(const Step& step, Collision& collision) {
-  bool integrate = false;
+  bool integrate = false, bends = false;
   for (int n = 0; Hit & hit : collision.hits) {
     const Contact& c = collision.contacts[n].get();
     Point& point = collision.points[n++];
     if (!(hit.approach_m_s > kMinImpactSpeedMS) || c.is_closed()) continue;
-    if (!hit.is_cord && find_own(step, hit) != nullptr) {
-      integrate = true;
-      continue;
-    }
+    const bool is_owned = !hit.is_cord && find_own(step, hit) != nullptr;
+    integrate = integrate || is_owned;
     if (hit.is_cord || (!bodies_.has_modes(hit.a) && !bodies_.has_modes(hit.b))) continue;
-    if (!(hit.restitution > 0.0)) continue;  // gravity keeps the surfaces together (rigid_impact.cpp)
+    if (!is_owned && !(hit.restitution > 0.0)) continue;  // gravity keeps the surfaces together (rigid_impact.cpp)
     const double inverse_mass = dot(hit.touch.normal, calc_mobility(collision.movers, point) * hit.touch.normal);
     std::vector<double> phi[2];
     impact::Side sides[2];
@@ -67,14 +72,16 @@ bool ModalImpacts::predict(const Step& step, Collision& collision) {
     for (const int side : {0, 1}) {
       const int body = side == 0 ? hit.a : hit.b;
       if (!bodies_.has_modes(body)) continue;
+      phi[side] = project(find_shape(bodies_, hit, side == 0), transpose(bodies_.placed(body).rotation) * hit.touch.normal);
+      if (bends_far(body, phi[side], 1.0 / inverse_mass, hit.approach_m_s)) hit.bends = bends = true;
       if (bodies_.is_in_impact(body)) {
         is_free = false;
         continue;
       }
-      phi[side] = project(find_shape(bodies_, hit, side == 0), transpose(bodies_.placed(body).rotation) * hit.touch.normal);
       const ModalState& state = states_.advance(body, bodies_.get_time());
       sides[side] = {bodies_.solid(body).modes.get(), phi[side], state.q, state.q_dot};
     }
+    if (is_owned) continue;
     const impact::Prediction p =
         impact::predict(make_spring(bodies_, hit), 1.0 / inverse_mass, hit.approach_m_s, hit.restitution, sides[0], sides[1]);
     integrate = integrate || (!p.is_enough && is_free && may_begin_);
@@ -83,7 +90,23 @@ bool ModalImpacts::predict(const Step& step, Collision& collision) {
       point.wanted = (hit.restitution * hit.approach_m_s) * hit.touch.normal;
     }
   }
-  return integrate;
+  return integrate && !bends;
+}
+
+/// True if the modes of a soft body, with shape values `phi` along the normal of a hit, may deflect it beyond the linear range: by their
+/// present swing, and by a reduced mass [kg] with that speed.
+bool ModalImpacts::bends_far(int body, const std::vector<double>& phi, double mass_kg, double speed_m_s) {
+  const double most_m = bodies_.solid(body).max_bend_m;
+  if (std::isinf(most_m)) return false;
+  const impact::Modes& modes = *bodies_.solid(body).modes;
+  double bend_m = 0.0;
+  if (!bodies_.is_in_impact(body)) {
+    const ModalState& state = states_.advance(body, bodies_.get_time());
+    bend_m = calc_displacement(phi, calc_amplitudes(modes, state.q, state.q_dot));
+  }
+  for (std::size_t m = 0; m < phi.size(); ++m)
+    if (const double omega = modes.get_omega()[m]; omega > 0.0) bend_m += std::abs(phi[m]) * std::sqrt(mass_kg) * speed_m_s / omega;
+  return bend_m > most_m;
 }
 
 /// A supported body is struck together with its supports: adds the resting contacts of the bodies of `order`, and of the bodies that
@@ -291,17 +314,17 @@ double ModalImpacts::fly_to_modes(const std::vector<Hit>& hits, const std::vecto
   return start_s;
 }
 
-/// Bound of the displacement of both surfaces at a touch by modes.
-double ModalImpacts::calc_swing(const Contact& touch) {
+/// Bound of the displacement of both surfaces at a touch by modes; 0 for bodies that the touch would bend far.
+double ModalImpacts::calc_swing(const Contact& touch, double approach_m_s) {
   Hit hit{.a = touch.a, .b = touch.b, .touch = touch.touch, .triangles = touch.triangles};
   double swing = 0.0;
   for (const bool is_a : {true, false}) {
     const int body = is_a ? hit.a : hit.b;
     if (!bodies_.has_modes(body)) continue;
+    const std::vector<double> phi = project(find_shape(bodies_, hit, is_a), transpose(bodies_.placed(body).rotation) * hit.touch.normal);
+    if (bends_far(body, phi, bodies_.solid(body).mass_kg, approach_m_s)) return 0.0;
     const ModalState& state = states_.advance(body, bodies_.get_time());
-    const std::vector<double> amplitudes = calc_amplitudes(*bodies_.solid(body).modes, state.q, state.q_dot),
-                              phi = project(find_shape(bodies_, hit, is_a), transpose(bodies_.placed(body).rotation) * hit.touch.normal);
-    for (std::size_t m = 0; m < phi.size(); ++m) swing += std::abs(phi[m]) * amplitudes[m];
+    swing += calc_displacement(phi, calc_amplitudes(*bodies_.solid(body).modes, state.q, state.q_dot));
   }
   return swing;
 }
@@ -328,7 +351,7 @@ void ModalImpacts::begin_early(const Step& step, double length_s, const Instants
       if (c.presses || c.is_closed() || approach < kMinEarlySpeedMS) continue;
       const double open_m = c.touch.gap_m - (approach + norm(bodies_.gravity()) * length_s) * length_s;
       if (open_m > bodies_.get_swing(c.a) + bodies_.get_swing(c.b)) continue;
-      if (const double swing_m = calc_swing(c); swing_m <= kMaxDepthM || open_m >= swing_m) continue;
+      if (const double swing_m = calc_swing(c, approach); swing_m <= kMaxDepthM || open_m >= swing_m) continue;
       early.push_back(&c);
       order.push_back(static_cast<int>(hits.size()));
       hits.push_back({.a = c.a, .b = c.b, .touch = c.touch, .triangles = c.triangles});

@@ -51,7 +51,8 @@ class ModalImpacts {
 
   /// False: no modal impact begins; impacts are rigid, their restitution reduced by the energy that modes would take.
   void allow(bool may_begin) { may_begin_ = may_begin; }
-  /// Limits the restitution of every hit by the energy transferred to modes; true if the impact must be integrated.
+  /// Limits the restitution of every hit by the energy transferred to modes; true if the impact must be integrated. Hits that would bend
+  /// a body far are rigid.
   bool predict(const Step& step, Collision& collision);
   /// Begins an impact, or adds the hits to a current one. False if there are too many points: use the rigid impact.
   bool begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches);
@@ -105,7 +106,8 @@ class ModalImpacts {
   bool add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const;
   bool shares_articulations(const std::vector<Hit>& hits, const std::vector<int>& order) const;
   bool join(const std::vector<Hit>& hits, Selection& selection, TouchSets& touches, ModalImpact*& joined);
-  double calc_swing(const Contact& touch);
+  bool bends_far(int body, const std::vector<double>& phi, double mass_kg, double speed_m_s);
+  double calc_swing(const Contact& touch, double approach_m_s);
   bool may_begin_early(const Step& step, const Pair& pair, const Instants& instants) const;
   double fly_to_modes(const std::vector<Hit>& hits, const std::vector<int>& order);
   int add_body(ModalImpact& modal, int body, std::vector<impact::Body>& made);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include "runtime/physics/impact/predict.hpp"
@@ -13,6 +12,9 @@
 namespace carillon::rigid {
 namespace {
 
+constexpr double kMaxStretch = 1e3;     // of the second pulse,
+constexpr double kStretchStep = 1.3;    // in steps
+constexpr double kFirstRatio = 0.25;    // of the available energy: given by the first of two pulses
 constexpr double kMaxShapeValue = 4.0;  // largest mode shape value times sqrt(mass): at the corners of a plate
 
 }  // namespace
@@ -66,6 +68,31 @@ void note_swing(Bodies& bodies, int body, const std::vector<double>& q, const st
 void ModalStates::excite(Strike& strike, double available_j) {
   std::map<int, ModalState> before;  // bodies whose modes are struck
   const Ledger ledger_before = ledger_;
+  double given = add_pulses(strike, before);
+  const auto undo = [&] {
+    for (auto& [body, state] : before) set(body, std::move(state));
+    before.clear();
+    ledger_ = ledger_before;
+  };
+  // Bodies that bend far: their surface is stopped at once, but the body slowly, by modes that get no more than the motion loses.
+  const bool bends = std::any_of(strike.hits.begin(), strike.hits.end(), [](const Hit& hit) { return hit.bends; });
+  if (bends && given > available_j) strike.first_share = std::sqrt(kFirstRatio * std::max(available_j, 0.0) / given);
+  while (bends && given > available_j && strike.stretch < kMaxStretch) {
+    undo();
+    strike.stretch *= kStretchStep;
+    given = add_pulses(strike, before);
+  }
+  if (given > std::max(available_j, 0.0)) {
+    undo();  // rigid impacts are only used if modes receive almost no energy
+    given = 0.0;
+  }
+  for (const auto& [body, state] : before) note_swing(bodies_, body, states_[body].q, states_[body].q_dot);
+  strike.modes_j = given;
+  ledger_.lose(available_j - given);
+}
+
+/// Returns the energy given to the modes, and their states before.
+double ModalStates::add_pulses(Strike& strike, std::map<int, ModalState>& before) {
   double given = 0.0;
   for (Hit& hit : strike.hits) {
     if (hit.impulse == Vec3{} || hit.is_cord || !(hit.approach_m_s > kMinImpactSpeedMS)) continue;
@@ -85,19 +112,24 @@ void ModalStates::excite(Strike& strike, double available_j) {
       const double energy = modes.calc_energy(state.q, state.q_dot);
       for (int m = 0; m < modes.size(); ++m)
         state.q_dot[m] += (shape[3 * m] * impulse[0] + shape[3 * m + 1] * impulse[1] + shape[3 * m + 2] * impulse[2]) *
-                          std::sqrt(impact::calc_pulse_spectrum(omega[m] * length));
+                          (strike.first_share * std::sqrt(impact::calc_pulse_spectrum(omega[m] * length)) +
+                           (1.0 - strike.first_share) * std::sqrt(impact::calc_pulse_spectrum(omega[m] * strike.stretch * length)));
       given += modes.calc_energy(state.q, state.q_dot) - energy;
     }
   }
-  if (given > std::max(available_j, 0.0)) {
-    // More than available: discarded. Rigid impacts are only used if modes receive almost no energy.
-    for (auto& [body, state] : before) states_[body] = std::move(state);
-    ledger_ = ledger_before;
-    given = 0.0;
-  }
-  for (const auto& [body, state] : before) note_swing(bodies_, body, states_[body].q, states_[body].q_dot);
-  strike.modes_j = given;
-  ledger_.lose(available_j - given);
+  return given;
+}
+
+double ModalStates::take(int body, double energy_j) {
+  ModalState& state = states_[body];
+  if (!bodies_.has_modes(body) || state.q.empty() || bodies_.is_in_impact(body)) return 0.0;
+  const double all_j = bodies_.solid(body).modes->calc_energy(state.q, state.q_dot), taken_j = std::min(energy_j, all_j);
+  if (!(taken_j > 0.0)) return 0.0;
+  const double part = std::sqrt(1.0 - taken_j / all_j);
+  for (double& q : state.q) q *= part;
+  for (double& q_dot : state.q_dot) q_dot *= part;
+  note_swing(bodies_, body, state.q, state.q_dot);
+  return taken_j;
 }
 
 void ModalStates::add_to(Books& books, double time_s) const {

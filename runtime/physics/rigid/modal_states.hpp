@@ -1,6 +1,7 @@
 // Modes of bodies between impacts.
 #pragma once
 
+#include <map>
 #include <vector>
 
 #include "runtime/physics/rigid/bodies.hpp"
@@ -31,16 +32,21 @@ class ModalStates {
 
   /// Advances freely to a time, unless it is later already; books damping losses.
   ModalState& advance(int body, double time_s);
+  const ModalState& get(int body) const { return states_[body]; }
   void set(int body, ModalState state) {
     states_[body] = std::move(state);
     note_swing(bodies_, body, states_[body].q, states_[body].q_dot);
   }
   /// Excites modes by the pulses of a rigid impact, with at most `available_j`, the loss of the motion; the remainder is booked as lost.
   void excite(Strike& strike, double available_j);
+  /// Takes up to `energy_j` from the modes of a body by reducing all amplitudes; returns the energy taken.
+  double take(int body, double energy_j);
   /// Adds energies at a time, and losses until then.
   void add_to(Books& books, double time_s) const;
 
  private:
+  double add_pulses(Strike& strike, std::map<int, ModalState>& before);
+
   Bodies& bodies_;
   Ledger& ledger_;
   PerBody<ModalState> states_;

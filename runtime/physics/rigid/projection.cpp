@@ -151,6 +151,9 @@ void Projection::move(const Step& step, const std::vector<Mover>& displacements,
       gained_j -= spent_j;
     }
   }
+  // Bent bodies push themselves off.
+  for (int n = 0; n < step.count() && gained_j > 0.0; ++n)
+    if (is_movable(step.body(n)) && displacements[n].velocity != Vec3{}) gained_j -= modes_.take(step.body(n), gained_j);
   if (!(gained_j > 0.0)) return ledger_.lose(-gained_j);
   ledger_.lift(gained_j);
   if (is_held && bodies_.get_time() > 0.0) owe(step, displacements, gained_j);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "runtime/physics/rigid/bodies.hpp"
+#include "runtime/physics/rigid/modal_states.hpp"
 #include "runtime/physics/rigid/solver.hpp"
 #include "runtime/physics/rigid/step.hpp"
 #include "runtime/physics/rigid/touch_sets.hpp"
@@ -16,7 +17,8 @@ namespace carillon::rigid {
 /// modes explain; these stay as they are.
 class Projection {
  public:
-  Projection(Bodies& bodies, TouchSets& touches, Ledger& ledger) : bodies_(bodies), touches_(touches), ledger_(ledger), owed_j_(bodies) {}
+  Projection(Bodies& bodies, TouchSets& touches, ModalStates& modes, Ledger& ledger)
+      : bodies_(bodies), touches_(touches), modes_(modes), ledger_(ledger), owed_j_(bodies) {}
 
   /// Takes the energy that bodies owe from their motion. Call at the start of a step, before run().
   void collect(const Step& step);
@@ -42,6 +44,7 @@ class Projection {
 
   Bodies& bodies_;
   TouchSets& touches_;
+  ModalStates& modes_;
   Ledger& ledger_;
   Solver solver_;
   PerBody<double> owed_j_;

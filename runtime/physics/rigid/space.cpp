@@ -33,7 +33,7 @@ Space::Space(std::vector<Solid> solids, std::vector<State> states, std::optional
       modal_impacts_(bodies_, modal_states_, ledger_),
       touches_(bodies_, links.cords, modal_impacts_, ledger_),
       windows_(bodies_, touches_, options_, ledger_),
-      projection_(bodies_, touches_, ledger_),
+      projection_(bodies_, touches_, modal_states_, ledger_),
       problem_(bodies_, touches_, options_, ledger_),
       instants_(bodies_, touches_),
       rigid_impact_(bodies_, touches_),
@@ -170,9 +170,9 @@ void Space::step_island(Island& island, double start_s, double length_s) {
 /// Puts an island to sleep if contact forces balance it: first with its bodies separated to kDeepM, then unchanged. If neither balances, no
 /// body is displaced: bodies falling back from a displacement would never come to rest.
 bool Space::try_rest(Island& island, double length_s) {
-  std::vector<std::pair<State, double>> kept;  // and the energy owed
+  std::vector<std::tuple<State, double, ModalState>> kept;  // and the energy owed
   std::vector<std::tuple<double, double, Pair::Errors>> kept_pairs;
-  for (const int body : island.bodies) kept.emplace_back(bodies_.state(body), projection_.get_owed(body));
+  for (const int body : island.bodies) kept.emplace_back(bodies_.state(body), projection_.get_owed(body), modal_states_.get(body));
   for (const Pair* pair : island.pairs) kept_pairs.emplace_back(pair->stored_j, pair->stopped_j, pair->errors);
   Books before, after;
   ledger_.add_to(before);
@@ -190,9 +190,11 @@ bool Space::try_rest(Island& island, double length_s) {
   ledger_.lose(before.lost_j - after.lost_j);
   ledger_.lift(before.lifted_j - after.lifted_j);
   for (int n = 0; const int body : island.bodies) {
-    projection_.set_owed(body, kept[n].second);
-    bodies_.state(body) = kept[n++].first;
+    auto& [state, owed_j, modes] = kept[n++];
+    projection_.set_owed(body, owed_j);
+    bodies_.state(body) = state;
     bodies_.place(body);
+    if (bodies_.has_modes(body) && !bodies_.is_in_impact(body)) modal_states_.set(body, std::move(modes));
   }
   for (int n = 0; Pair * pair : island.pairs) {
     if (!pair->contacts.empty()) touches_.refresh(*pair);

@@ -61,7 +61,7 @@ struct Stages {
   ModalImpacts modal_impacts{bodies, modal_states, ledger};
   TouchSets touches{bodies, {}, modal_impacts, ledger};
   Windows windows{bodies, touches, options, ledger};
-  Projection projection{bodies, touches, ledger};
+  Projection projection{bodies, touches, modal_states, ledger};
   StepProblem problem{bodies, touches, options, ledger};
   Instants instants{bodies, touches};
   RigidImpact rigid_impact{bodies, touches};
