@@ -109,16 +109,16 @@ std::pair<int, double> LowVertices::find(const Shape& shape, const Vec3& up) {
 
 bool may_tip(const Shape& a, const Frame& frame, const Vec3& normal, const Vec3& spin, std::span<const Vec3> touches, double far_m,
              double time_s) {
-  const Vec3 up = turn_back(frame.rotation, normal), lever = turn_back(frame.rotation, cross(normal, spin));
+  const Vec3 up = turn_back(frame.rotation, normal), turned = up + time_s * turn_back(frame.rotation, cross(normal, spin));
   const Vec3 &first = touches.front(), along = touches.back() - first;
   const auto tips = [&](int vertex) {
     const Vec3 from = a.mesh().vertices[vertex] - first;
-    if (dot(up, from) + time_s * dot(lever, from) > 0.0) return false;
+    if (dot(turned, from) > 0.0) return false;
     const double part = norm2(along) > 0.0 ? std::clamp(dot(from, along) / norm2(along), 0.0, 1.0) : 0.0;
     return norm2(from - part * along) > far_m * far_m;
   };
   // `up` may leave its cell within the time.
-  const std::vector<int>&now = a.low_vertices().list(a, up), &then = a.low_vertices().list(a, normalise(up + time_s * lever));
+  const std::vector<int>&now = a.low_vertices().list(a, up), &then = a.low_vertices().list(a, normalise(turned));
   return std::any_of(now.begin(), now.end(), tips) || (&then != &now && std::any_of(then.begin(), then.end(), tips));
 }
 

@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <type_traits>
 
 #include "runtime/physics/rigid/solver.hpp"
@@ -63,20 +64,22 @@ class System {
       rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
       counts.insert(counts.end(), 6, 6 * static_cast<int>(rows.size()));
     }
-    sparse_.resize(6 * bodies, 6 * bodies);
-    sparse_.reserve(counts);
+    sparse_.emplace();
+    Eigen::SparseMatrix<double>& matrix = sparse_->matrix;
+    matrix.resize(6 * bodies, 6 * bodies);
+    matrix.reserve(counts);
     for (int column = 0; column < 6 * bodies; ++column)
       for (const int row : below_[column / 6])
-        for (int i = 0; i < 6; ++i) sparse_.insert(6 * row + i, column) = 0.0;
-    sparse_.makeCompressed();
-    sparse_solver_.analyzePattern(sparse_);
+        for (int i = 0; i < 6; ++i) matrix.insert(6 * row + i, column) = 0.0;
+    matrix.makeCompressed();
+    sparse_->solver.analyzePattern(matrix);
   }
 
   void clear() {
     if (is_dense())
       std::fill(full_.begin(), full_.end(), 0.0);
     else
-      std::fill_n(sparse_.valuePtr(), sparse_.nonZeros(), 0.0);
+      std::fill_n(sparse_->matrix.valuePtr(), sparse_->matrix.nonZeros(), 0.0);
   }
   void add_inertia(int body, double mass_kg, const Eigen::Matrix3d& inertia) {
     Block block = Block::Zero();
@@ -97,15 +100,15 @@ class System {
 
   bool factorise() {
     if (is_dense()) return factorise_dense();
-    sparse_solver_.factorize(sparse_);
-    return sparse_solver_.info() == Eigen::Success;
+    sparse_->solver.factorize(sparse_->matrix);
+    return sparse_->solver.info() == Eigen::Success;
   }
   /// Replaces the right side by the solution.
   void solve(Eigen::VectorXd& right) const {
     if (is_dense())
       solve_dense(right.data());
     else
-      right = sparse_solver_.solve(right);
+      right = sparse_->solver.solve(right);
   }
 
  private:
@@ -124,7 +127,7 @@ class System {
     if (is_dense()) return Place(&full_[6 * column * size + 6 * row], Eigen::OuterStride<>(size));
     const std::vector<int>& rows = below_[column];
     const auto slot = std::lower_bound(rows.begin(), rows.end(), row) - rows.begin();
-    return Place(sparse_.valuePtr() + sparse_.outerIndexPtr()[6 * column] + 6 * slot,
+    return Place(sparse_->matrix.valuePtr() + sparse_->matrix.outerIndexPtr()[6 * column] + 6 * slot,
                  Eigen::OuterStride<>(6 * static_cast<Eigen::Index>(rows.size())));
   }
 
@@ -167,8 +170,11 @@ class System {
   int bodies_;
   std::vector<std::vector<int>> below_;  // row indices of the blocks of each column
   std::vector<double> full_;
-  Eigen::SparseMatrix<double> sparse_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> sparse_solver_;
+  struct Sparse {
+    Eigen::SparseMatrix<double> matrix;
+    Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver;
+  };
+  std::optional<Sparse> sparse_;  // none where dense: its construction costs as much as a small solution
 };
 
 /// Guess of the load-bearing, sticking and rolling points, and the resulting impulses.
@@ -179,9 +185,7 @@ class Guess {
         points_(points),
         compliance_(choose_compliance(free, points.size())),
         system_(static_cast<int>(free.size()), points),
-        right_(6 * static_cast<int>(free.size())),
-        left_(points.size()),
-        left_spin_(points.size()) {
+        right_(6 * static_cast<int>(free.size())) {
     held_.reserve(points.size());
     for (const Point& p : points) scale_ = std::max(scale_, norm(p.wanted - calc_relative_velocity(free, p)));
   }
@@ -201,6 +205,7 @@ class Guess {
     double stiffness = 0.0, turning_mass = 0.0;
     std::array<Vec3, 3> axes{};
     Vec3 sliding{}, impulse{}, couple{};
+    Vec3 left{}, left_spin{};                  // missing velocity and spin
     double last_angle = 0.0, last_turn = 0.0;  // of the sliding impulse in the preceding guess; turn 0: none
     /// Held part of a spin or couple.
     Vec3 hold_turning(const Vec3& turning) const {
@@ -236,9 +241,8 @@ class Guess {
   std::vector<Held> held_;      // of the points
   bool is_factorised_ = false;  // for the current holds
   System system_;
-  Eigen::VectorXd right_;               // work memory
-  std::vector<Vec3> left_, left_spin_;  // work memory
-  double scale_ = 0.0;                  // m/s
+  Eigen::VectorXd right_;  // work memory
+  double scale_ = 0.0;     // m/s
 };
 
 void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
@@ -329,21 +333,20 @@ double Guess::iterate(std::vector<Mover>& movers) {
     for (int k = 0; k < 3 && body >= 0; ++k) right_[6 * body + from + k] += pull[k];
   };
   double largest = 0.0;
-  for (int i = 0; const Held& held : held_) {
-    const int n = i++;
-    const Point& p = points_[n];
+  for (int i = 0; Held & held : held_) {
+    const Point& p = points_[i++];
     if (held.hold == Hold::kOpen) continue;
-    left_[n] = p.wanted - calc_relative_velocity(movers, p);
-    if (held.hold == Hold::kSlides) left_[n] = dot(left_[n], p.normal) * p.normal;
-    largest = std::max(largest, norm(left_[n]));
-    const Vec3 pull = held.stiffness * left_[n];
+    held.left = p.wanted - calc_relative_velocity(movers, p);
+    if (held.hold == Hold::kSlides) held.left = dot(held.left, p.normal) * p.normal;
+    largest = std::max(largest, norm(held.left));
+    const Vec3 pull = held.stiffness * held.left;
     add(p.a, 0, pull);
     add(p.a, 3, cross(p.arm_a, pull));
     add(p.b, 0, -1.0 * pull);
     add(p.b, 3, cross(pull, p.arm_b));
     if (!(held.turning_mass > 0.0)) continue;
-    left_spin_[n] = -1.0 * held.hold_turning(calc_relative_spin(movers, p));
-    const Vec3 couple = (held.turning_mass / compliance_) * left_spin_[n];
+    held.left_spin = -1.0 * held.hold_turning(calc_relative_spin(movers, p));
+    const Vec3 couple = (held.turning_mass / compliance_) * held.left_spin;
     add(p.a, 3, couple);
     add(p.b, 3, -1.0 * couple);
   }
@@ -354,19 +357,18 @@ double Guess::iterate(std::vector<Mover>& movers) {
     return Vec3{x[0], x[1], x[2]};
   };
   for (int i = 0; Held & held : held_) {
-    const int n = i++;
-    const Point& p = points_[n];
+    const Point& p = points_[i++];
     if (held.hold == Hold::kOpen) continue;
     Vec3 moved{}, turned{};
     if (p.a >= 0) moved = get(p.a, 0) + cross(get(p.a, 3), p.arm_a), turned = get(p.a, 3);
     if (p.b >= 0) moved = moved - get(p.b, 0) - cross(get(p.b, 3), p.arm_b), turned = turned - get(p.b, 3);
     if (held.hold == Hold::kSlides) moved = dot(moved, p.normal) * p.normal;
-    const Vec3 more = held.stiffness * (left_[n] - moved);
+    const Vec3 more = held.stiffness * (held.left - moved);
     held.impulse = held.impulse + more;
     apply(movers, p, more);
     if (!(held.turning_mass > 0.0)) continue;
     const Vec3 couple =
-        (held.turning_mass / compliance_) * (left_spin_[n] - held.hold_turning(turned)) + calc_rest_of_bound(movers, p, held);
+        (held.turning_mass / compliance_) * (held.left_spin - held.hold_turning(turned)) + calc_rest_of_bound(movers, p, held);
     held.couple = held.couple + couple;
     turn(movers, p, couple);
   }

@@ -21,7 +21,7 @@ constexpr double kLongStepRatio =
 constexpr double kArcSagM = 5e-6;  // m; permitted deviation of a point on an arc from its chord in a step,
 constexpr double kArcSagRatio = 5e-4;       // the same relative to the thickness of its body
 constexpr double kRollingArcRatio = 4.0;    // times the arc bounded by a body's box: keeps long rolling bodies within 50 um
-constexpr double kSpanningArcRatio = 0.25;  // the same on smooth touches far apart, which follow the surface
+constexpr double kSpanningArcRatio = 0.02;  // the same on smooth touches far apart, which follow the surface
 constexpr double kFlatStepRatio = 2.0;      // times the step of others: for groups with flat contacts only
 constexpr double kBoxMarginM = 1e-4;        // m; enlargement of boxes
 // A body that rolls alone on smooth touches takes longer steps:
@@ -29,7 +29,7 @@ constexpr double kRollingStepRatio = 4.0;  // longest step, times options.step_s
 constexpr double kQuietS = 10e-3;          // s; required time without an impact
 constexpr double kNearRatio = 0.02;        // fraction of its size,
 constexpr double kTravelRatio = 3.0;       // or touch travel per window: no vertex farther from the touches may come down
-constexpr double kMaxTurnRad = 0.05;       // rad; maximum rotation of a normal in the body per step
+constexpr double kMaxTurnRad = 0.25;       // rad; maximum rotation of a normal in the body per step
 constexpr double kMaxSpanRatio = 0.25;     // fraction of its size: touches farther apart prevent hopping
 
 }  // namespace
