@@ -78,7 +78,7 @@ void LowVertices::fill(const Shape& shape, const Cell& cell, std::vector<int>& l
     int e = start;
     do {
       const int other = mesh.vertex_of(Mesh::next(e));
-      if (shape.skin().kind(other) != VertexKind::none && !is_below(vertex, mesh.vertices[other])) return false;
+      if (!is_below(vertex, mesh.vertices[other]) && shape.skin().kind(other) != VertexKind::none) return false;
       e = Mesh::next(mesh.opposite[e]);
     } while (e != start);
     return true;

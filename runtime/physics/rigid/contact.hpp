@@ -44,7 +44,7 @@ struct Contact {
   /// Touching, or open by no more than facets of a rolling surface cause.
   bool is_close() const { return touching || (touch.smooth && touch.gap_m <= kMissingDepthM); }
   /// A rolling contact stays closed where its gap drifts.
-  bool is_closed() const { return touching && touch.gap_m <= (touch.smooth ? kGapDriftM : kTouchGapM); }
+  bool is_closed() const { return touching && touch.gap_m <= (!touch.smooth ? kTouchGapM : b < 0 ? kGroundDriftM : kGapDriftM); }
 };
 
 /// Contacts of two bodies, of a body and the ground, or of a cord.

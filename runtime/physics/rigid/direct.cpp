@@ -36,6 +36,19 @@ enum class Hold : char { kOpen, kSticks, kSlides };
 
 Row6 make_row(const Vec3& linear, const Vec3& angular) { return {linear[0], linear[1], linear[2], angular[0], angular[1], angular[2]}; }
 
+/// Normal velocity per normal impulse at a point [1/kg], of bodies without joints.
+double calc_normal_mobility(const std::vector<Mover>& movers, const Point& p) {
+  double mobility = 0.0;
+  const auto add = [&](int body, const Vec3& arm) {
+    if (body < 0) return;
+    const Vec3 lever = cross(arm, p.normal);
+    mobility += movers[body].inverse_mass + dot(lever, movers[body].inverse_inertia * lever);
+  };
+  add(p.a, p.arm_a);
+  add(p.b, p.arm_b);
+  return mobility;
+}
+
 /// Compliance of a row over its mobility. Soft enough for conflicts of 1e-9 m/s between rows (two touches of a rolling body), whose
 /// impulses must stay in the cone; stiff enough for convergence of chains and unequal masses.
 double choose_compliance(const std::vector<Mover>& movers, std::size_t points) {
@@ -467,8 +480,7 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
   if (std::any_of(movers.begin(), movers.end(), [](const Mover& m) { return m.linkage != nullptr; })) return false;
   const std::vector<Mover> free = movers;
   Guess guess(free, points);
-  for (const Point& p : points)
-    guess.add(1.0 / dot(p.normal, calc_mobility(movers, p) * p.normal), calc_turning_mass(movers, p), are_swept);
+  for (const Point& p : points) guess.add(1.0 / calc_normal_mobility(movers, p), calc_turning_mass(movers, p), are_swept);
   bool confirmed = false;
   for (int n = 0; n < max_guesses && !confirmed; ++n) {
     if (!guess.solve(movers)) return false;

@@ -196,7 +196,7 @@ void Windows::find_rolling(base::Groups& groups) {
     const int body = bodies_.moves(pair->a) ? pair->a : pair->b;
     if (!bodies_.moves(body)) continue;
     const Pair::Errors last = std::exchange(pair->errors, {});
-    errors[body] = std::max({errors[body], std::cbrt(last.drift_m / kGapDriftM), last.turn / kMaxTurnRad});
+    errors[body] = std::max({errors[body], std::cbrt(last.drift_m / (pair->b < 0 ? kGroundDriftM : kGapDriftM)), last.turn / kMaxTurnRad});
     if (pair->cord >= 0 || pair->sag_m > 0.0) rolls[body] = 0;
     if (rolls[body] == 0) continue;
     stations.clear();
