@@ -6,22 +6,18 @@ import json
 import math
 import pathlib
 import struct
-import subprocess
 
-import h5py
 import numpy
 import scipy.spatial
 
-import grid
 import programs
-import shapes
+import skin
 import solver
 from errors import InputError
 from quantities import LENGTH_UNITS, read_quantity
 from sites import find_sites
 
-SAME_SIDE = 0.5  # cosine of the largest angle between the normals of a spot
-FIRST_ORDER, MAX_RAYS = 0.05, 64  # share of the wall that first order allows to cut; sites where the wall is measured
+FIRST_ORDER = 0.05  # share of the wall that first order allows to cut
 
 
 def read_point(text):
@@ -66,24 +62,22 @@ class Map:
     """Sites S of a bank with densities of n modes; docs/bank-format.md, sensitivities."""
 
     def __init__(self, path, program):
-        rows = list(csv.DictReader(io.StringIO(run_program([program, "info", "--csv", "--modes", "100000", path]))))
-        is_packed = path.read_bytes()[:17].startswith(b"CARILLON BANK 2.")
-        data = io.BytesIO(run_program([program, "unpack", path, "-"], is_text=False)) if is_packed else path
-        with h5py.File(data, "r") as bank:
+        rows = list(csv.DictReader(io.StringIO(solver.run_program([program, "info", "--csv", "--modes", "100000", path]))))
+        with solver.open_bank(path, program) as bank:
             if "sensitivity" not in bank:
                 raise InputError(f'{path}: has no sensitivities; compute it again with "sensitivities": 30 in its job')
             group = bank["sensitivity"]
             self.by_parameter = group["by_parameter"][:]
             self.sites = solver.read_sites(group, numpy.arange(len(bank["modes/eigenvalue"])))
+            self.skin = skin.Skin(bank["mesh/vertices"][:], bank["mesh/triangles"][:], self.sites)
             self.parameters = json.loads(group["parameters"][()].rstrip(b"\0") or "[]")
-            self.vertices, self.triangles = bank["mesh/vertices"][:], bank["mesh/triangles"][:]
             self.poisson_ratio = float(bank["material/poisson_ratio"][()])
             job = json.loads(bank["provenance"][()].rstrip(b"\0"))
         while "of" in job:  # a packed or edited bank
             job = job["of"]
         body = job.get("body", {})
         self.thickness_m = body.get("wall_m", body.get("thickness_m"))
-        self.place = self.vertices[self.sites.vertex]
+        self.place = self.skin.place
         self.count = len(self.by_parameter)
         self.freq_hz = numpy.array([float(row["heard_frequency_hz"]) for row in rows])[: self.count]
         self.mesh_hz = numpy.array([float(row["frequency_hz"]) for row in rows])[: self.count]
@@ -134,44 +128,15 @@ class Map:
         depth = numpy.where(is_face, 0.5 * share * self.thickness_m, 0.0)
         return -self.calc_changes(depth) * math.log(2) / 1200 / share
 
-    def make_spot(self, at_m, radius_m, cut_m):
-        """Depth (S) of a spot around the nearest site, on its side of the surface."""
-        nearest = numpy.linalg.norm(self.place - at_m, axis=1).argmin()
-        share = numpy.linalg.norm(self.place - self.place[nearest], axis=1) / radius_m
-        depth = numpy.where(self.sites.normal @ self.sites.normal[nearest] > SAME_SIDE, cut_m * grid.fade(share), 0.0)
-        return nearest, depth
-
-    def find_share(self, depth):
-        """(largest share of the wall that a cut (S) takes, from both sides if both are cut; the wall [m]). Sites of sharp edges, where no
-        wall is defined, do not count."""
-        inner = numpy.flatnonzero((numpy.bincount(self.sites.vertex)[self.sites.vertex] == 1) & (depth > 0.5 * depth.max()))
-        if not len(inner):
-            return 0.0, math.inf
-        at = inner[numpy.argsort(-depth[inner], kind="stable")][:: 1 + len(inner) // MAX_RAYS]
-        wall = shapes.find_wall(self.vertices, self.triangles, self.place[at], -self.sites.normal[at])
-        _, other = scipy.spatial.cKDTree(self.place).query(self.place[at] - numpy.minimum(wall, 1e3)[:, None] * self.sites.normal[at])
-        share = (depth[at] + depth[other] * numpy.isfinite(wall)) / wall
-        return share.max(), wall[share.argmax()]
-
     def check_cut(self, depth, cut_m):
         """A warning about the first order, or none. InputError where nothing would be left."""
-        share, wall = self.find_share(depth)
-        most = f"{1e3 * cut_m * FIRST_ORDER / share:.2g} mm" if share > 0 else ""
-        if share >= 1:
-            raise InputError(f"--cut {1e3 * cut_m:g}mm: no wall is left where it is {1e3 * wall:.3g} mm thick; give at most {most}")
-        if share > FIRST_ORDER:
-            return [
-                f"warning: {100 * share:.0f} % of the wall is cut, where first order is off by as much; give at most {most}, or solve again"
-            ]
-        return []
-
-
-def run_program(words, is_text=True):
-    done = subprocess.run([str(word) for word in words], capture_output=True, text=is_text)
-    if done.returncode != 0:
-        error = done.stderr if is_text else done.stderr.decode(errors="replace")
-        raise InputError(error.strip().removeprefix(f"{pathlib.Path(words[0]).name}: "))
-    return done.stdout
+        share = self.skin.check_share(depth, f"--cut {1e3 * cut_m:g}mm", FIRST_ORDER)
+        if share <= FIRST_ORDER:
+            return []
+        most = f"{1e3 * cut_m * FIRST_ORDER / share:.2g} mm"
+        return [
+            f"warning: {100 * share:.0f} % of the wall is cut, where first order is off by as much; give at most {most}, or solve again"
+        ]
 
 
 def show_place(place):
@@ -225,7 +190,7 @@ def write_glb(found, mode, path):
         (found.sites.normal.astype("<f4"), "VEC3", 5126, 34962),
         (choose_colours(found.sites.density[:, mode], found.sites.doubtful).astype("<f4"), "VEC3", 5126, 34962),
         (
-            find_sites(found.vertices, found.triangles, found.sites.vertex, found.sites.normal).astype("<u4").reshape(-1),
+            find_sites(found.skin.vertices, found.skin.triangles, found.sites.vertex, found.sites.normal).astype("<u4").reshape(-1),
             "SCALAR",
             5125,
             34963,
@@ -268,7 +233,7 @@ def run(arguments):
     if arguments.at is not None:
         size = numpy.linalg.norm(numpy.ptp(found.place, axis=0))
         radius = arguments.radius or 0.1 * size
-        nearest, depth = found.make_spot(arguments.at, radius, arguments.cut)
+        nearest, depth = found.skin.make_spot(arguments.at, radius, arguments.cut)
         touched = depth > 0
         if touched.sum() < 8:
             raise InputError(
@@ -297,7 +262,7 @@ def run(arguments):
             write_glb(found, arguments.mode - 1, path)
         else:
             draw = programs.find_program(arguments.bin, "carillon-draw")
-            run_program([draw, "sensitivities", arguments.bank, "-o", path, "--modes", arguments.mode])
+            solver.run_program([draw, "sensitivities", arguments.bank, "-o", path, "--modes", arguments.mode])
         out.append(str(path))
     rows = [
         {"mode": k + 1, "hz": found.freq_hz[k], "kind": found.kind[k], "cents": changes[k]}

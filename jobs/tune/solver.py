@@ -1,6 +1,7 @@
 """Solves a job with carillon-precompute in a temporary folder and reads its bank; follows modes from one solve to another."""
 import concurrent.futures
 import dataclasses
+import io
 import json
 import os
 import pathlib
@@ -60,9 +61,14 @@ class Solver:
         self.solves = 0
         measuring.run_part([program, "--validate", self.job_file.resolve()], self.job_file.resolve().parent, self.job_file)
 
-    def solve(self, job, sensitivities=0, keep=None):
-        """The Solution of a job, with sensitivities and kinds of so many modes. keep: path of its bank. RunError of the solver."""
-        job = {key: job[key] for key in KEYS if key in job} | {"shapes": "exact", "bank": "bank.hdf"}
+    def solve(self, job, sensitivities=0, keep=None, is_whole=False):
+        """The Solution of a job, with sensitivities and kinds of so many modes. keep: path of its bank. is_whole: of all keys of the job,
+        not of those alone that decide the frequencies. RunError of the solver."""
+        job = (
+            job | {"bank": "bank.hdf"}
+            if is_whole
+            else {key: job[key] for key in KEYS if key in job} | {"shapes": "exact", "bank": "bank.hdf"}
+        )
         if sensitivities:
             job["sensitivities"] = sensitivities
         base = self.job_file.resolve().parent
@@ -96,6 +102,24 @@ class Solver:
         """Their Solutions, as many at once as there are cores."""
         with concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
             return list(pool.map(self.solve, jobs))
+
+
+def run_program(words, is_text=True):
+    """Its standard output. InputError with its message."""
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=is_text)
+    if done.returncode != 0:
+        error = done.stderr if is_text else done.stderr.decode(errors="replace")
+        raise InputError(error.strip().removeprefix(f"{pathlib.Path(words[0]).name}: "))
+    return done.stdout
+
+
+def open_bank(path, program):
+    """An HDF5 file of a bank, unpacked by `program`, carillon-bank, where it is packed. InputError."""
+    try:
+        is_packed = path.read_bytes()[:17].startswith(b"CARILLON BANK 2.")
+        return h5py.File(io.BytesIO(run_program([program, "unpack", path, "-"], is_text=False)) if is_packed else path, "r")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read as a bank: {error}; give one of carillon-precompute") from None
 
 
 def read_bank(path, job_file):

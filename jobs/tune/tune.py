@@ -3,16 +3,15 @@ import json
 import math
 import pathlib
 import resource
-import shutil
 import tempfile
 
 import numpy
 
-import drawing
-import grid
 import job_file
 import measuring
 import programs
+import recut
+import results
 import shapes
 import steps
 import targets
@@ -59,6 +58,11 @@ def add_command(commands):
         "knots along the outline",
     )
     add(
+        "--cuts",
+        metavar="CUTS.json",
+        help="no wishes: removes the spots that the page of carillon explore has written, and solves again; in place of the job also its bank",
+    )
+    add(
         "--remove",
         default="",
         metavar="SIDE",
@@ -80,6 +84,8 @@ def run(options):
         raise InputError("--cents: between 0.001 and 100")
     if options.knots is not None and not 1 <= options.knots <= 400:
         raise InputError("--knots: between 1 and 400")
+    if options.cuts:
+        return recut.run(options)
     job = job_file.read_job(options.job)
     wall, tolerance = options.wall, options.tolerance
     say = (lambda text: None) if options.json else (lambda text: print(text, flush=True))
@@ -170,7 +176,7 @@ def report(options, outcome, wishes, tolerance, solver, out):
     if not outcome.reached:
         text.append(f"not reached: {outcome.obstacle}")
     lines = table.splitlines()
-    write_files(out, outcome, options, [lines[0], *lines[2:]])
+    results.write_files(out, outcome, options.job, [lines[0], *lines[2:]])
     (out / "table.txt").write_text("\n".join(text) + "\n")
     for mode in modes:  # JSON has no infinity: an unknown bar
         mode |= {key: mode[key] if math.isfinite(mode[key]) else None for key in columns}
@@ -186,25 +192,3 @@ def report(options, outcome, wishes, tolerance, solver, out):
     (out / "tune.json").write_text(json.dumps(document, indent=1) + "\n")
     text.append(", ".join(str(path) for path in sorted(out.iterdir())))
     return "\n".join(text), document
-
-
-def write_files(out, outcome, options, table):
-    """Job, mesh, surfaces, drawing and bank of the last design."""
-    body, p = outcome.body, outcome.last.p
-    job = body.make_job(p, out) | {"bank": "again.hdf"}
-    if "mesh" in job:
-        job["mesh"] = "body.msh"
-    if "surface" in job.get("body", {}):
-        job["body"]["surface"] = str((pathlib.Path(options.job).resolve().parent / job["body"]["surface"]).resolve())
-    (out / "job.json").write_text(json.dumps(job, indent=1) + "\n")
-    for ending in ("", ".resolved.json"):
-        shutil.copyfile(f"{outcome.last.bank}{ending}", out / f"bank.hdf{ending}")
-    before, after = body.get_surfaces(outcome.first, outcome.last)
-    grid.write_stl(out / "body.stl", *after)
-    grid.write_obj(out / "body.obj", *after)
-    if before[1] is after[1]:
-        grid.write_stl(out / "cut.stl", *grid.find_cut(before[0], *after))
-    if body.profile:
-        head, rows = body.profile(p)
-        numpy.savetxt(out / "profile.csv", rows, fmt="%.4f", delimiter=",", header=head, comments="")
-    drawing.draw(out / "drawing.svg", before, after, f"{pathlib.Path(options.job).stem}, tuned", table)

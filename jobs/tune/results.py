@@ -1,0 +1,33 @@
+"""Files of a design of carillon tune."""
+import json
+import pathlib
+import shutil
+
+import numpy
+
+import drawing
+import grid
+
+MESH = "body.msh"
+
+
+def write_files(out, outcome, job_file, table):
+    """Job, mesh, surfaces, drawing and bank of the last design."""
+    body, p = outcome.body, outcome.last.p
+    job = body.make_job(p, out) | {"bank": "again.hdf"}
+    if "mesh" in job:
+        job["mesh"] = MESH
+    if "surface" in job.get("body", {}):
+        job["body"]["surface"] = str((pathlib.Path(job_file).resolve().parent / job["body"]["surface"]).resolve())
+    (out / "job.json").write_text(json.dumps(job, indent=1) + "\n")
+    for ending in ("", ".resolved.json"):
+        shutil.copyfile(f"{outcome.last.bank}{ending}", out / f"bank.hdf{ending}")
+    before, after = body.get_surfaces(outcome.first, outcome.last)
+    grid.write_stl(out / "body.stl", *after)
+    grid.write_obj(out / "body.obj", *after)
+    if before[1] is after[1]:
+        grid.write_stl(out / "cut.stl", *grid.find_cut(before[0], *after))
+    if body.profile:
+        head, rows = body.profile(p)
+        numpy.savetxt(out / "profile.csv", rows, fmt="%.4f", delimiter=",", header=head, comments="")
+    drawing.draw(out / "drawing.svg", before, after, f"{pathlib.Path(job_file).stem}, tuned", table)
