@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <cstdio>
+#include <map>
 #include <string>
 
 #include "jobs/cli/commands.hpp"
@@ -47,6 +48,7 @@ int run_explore(Shared& shared, const ExploreOptions& options) {
   std::error_code error;
   const bool is_made = order.subjects.size() == 1 && std::filesystem::is_directory(order.subjects[0], error);
   base::Json root;
+  std::map<std::string, std::filesystem::path> originals;
   if (is_made) {
     order.folder = order.subjects[0];
     if (!options.is_serving || !explore::is_explorer(order.folder))
@@ -58,6 +60,7 @@ int run_explore(Shared& shared, const ExploreOptions& options) {
     const explore::Explored made = explore::explore(order);
     order.folder = made.folder;
     root = describe(made);
+    for (const explore::PageBank& bank : made.banks) originals.emplace(bank.name, bank.original);
     if (!shared.json) print(made);
   }
   if (!options.is_serving) {
@@ -68,7 +71,7 @@ int run_explore(Shared& shared, const ExploreOptions& options) {
     flush();
     return 0;
   }
-  (void)explore::serve(order.folder, options.port, [&](const std::string& address) {
+  (void)explore::serve(order.folder, originals, options.port, [&](const std::string& address) {
     root["address"] = address;
     if (shared.json)
       print_json(root);

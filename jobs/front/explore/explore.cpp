@@ -125,6 +125,7 @@ const BankFacts& PageBanks::add(const fs::path& file) {
   find_material(bank, file, facts);
   find_place(bank, facts);
   facts.kept.full_bytes = fs::file_size(file);
+  facts.kept.original = whole;
   std::set<std::string> taken;
   for (const BankFacts* other : order_) taken.insert(other->kept.name);
   const std::string stem = make_name(file.stem().string());

@@ -23,6 +23,7 @@ struct PageOrder {
 struct PageBank {
   std::string name;                          // of the file in the folder
   std::uintmax_t bytes = 0, full_bytes = 0;  // of the file, and of the original
+  std::filesystem::path original = {};       // that it was made from
   std::string change;                        // description of the packing; empty: unchanged
 };
 

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <optional>
 
+#include "jobs/front/explore/recut.hpp"
 #include "runtime/base/percent.hpp"
 
 namespace carillon::explore {
@@ -67,6 +68,8 @@ FileRequest parse_request(std::string_view head) {
   if (line != "HTTP/1.1" && line != "HTTP/1.0") return refuse(line.substr(0, 5) == "HTTP/" ? 505 : 400);
   request.is_reusable = line == "HTTP/1.1";
   int hosts = 0;
+  std::string type;
+  std::optional<std::uint64_t> length;
   while (!head.empty()) {
     std::string_view value = take_line();
     const std::size_t colon = value.find(':');
@@ -83,8 +86,19 @@ FileRequest parse_request(std::string_view head) {
     } else if (name == "transfer-encoding" || (name == "content-length" && value != "0")) {
       request.is_reusable = false;
     }
+    if (name == "content-type") type = make_lower(value.substr(0, value.find(';')));
+    if (name == "content-length") length = parse_count(value);
   }
   if (hosts > 1) return refuse(400);
+  request.is_post = method == "POST" && request.path == kRecutPath;
+  if (request.is_post) {
+    if (!length) return refuse(411);
+    if (*length > kMaxRecutBytes) return refuse(413);
+    if (trim(type) != "application/json") return refuse(415);
+    request.length = *length;
+    request.is_reusable = false;
+    return request;
+  }
   request.is_head = method == "HEAD";
   if (!request.is_head && method != "GET") return refuse(405);
   return request;

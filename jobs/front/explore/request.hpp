@@ -1,4 +1,4 @@
-// HTTP/1.1 requests for files.
+// HTTP/1.1 requests for files, and those to compute a body anew.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,9 @@
 namespace carillon::explore {
 
 struct FileRequest {
-  int status = 200;         // HTTP status of the answer: 200, 400, 405, 505
+  int status = 200;      // HTTP status of the answer: 200, 400, 405, 411, 413, 415, 505
+  bool is_post = false;  // POST to kRecutPath, followed by `length` bytes of JSON
+  std::uint64_t length = 0;
   bool is_head = false;     // HEAD: answer without a body
   bool is_reusable = true;  // keep-alive
   std::string path;         // decoded, without the query; begins with "/"
@@ -16,7 +18,8 @@ struct FileRequest {
   std::string range;  // value of the header; empty: none
 };
 
-/// Parses request line and headers, without the final empty line. A request with a body is not reusable: the body is never read.
+/// Parses request line and headers, without the final empty line. A request with a body is not reusable:
+/// the body of a GET is never read. POST requests must be JSON, which pages of other origins cannot send unasked (Fetch standard, CORS).
 FileRequest parse_request(std::string_view head);
 
 /// A range of bytes of a file.

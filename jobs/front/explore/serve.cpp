@@ -22,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "jobs/front/explore/recut.hpp"
 #include "jobs/front/explore/request.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/descriptor.hpp"
@@ -35,6 +36,7 @@ constexpr std::size_t kMaxHead = 16 << 10, kPiece = 256 << 10;
 constexpr std::size_t kMaxConnections = 200;  // two descriptors each; the usual limit is 1024
 constexpr double kHeadS = 10.0;               // for a request
 constexpr double kPieceS = 600.0;             // for the next piece: browsers may pause reading
+constexpr double kRecutS = 0.2;               // between looks at a body that is computed
 constexpr double kEndS = 10.0;                // for the rest of a refused request
 
 /// SIGINT and SIGTERM as a descriptor; blocked in this thread and its children.
@@ -66,6 +68,8 @@ const char* find_reason(int status) {
   switch (status) {
     case 200:
       return "OK";
+    case 202:
+      return "Accepted";
     case 206:
       return "Partial Content";
     case 400:
@@ -74,12 +78,24 @@ const char* find_reason(int status) {
       return "Not Found";
     case 405:
       return "Method Not Allowed";
+    case 409:
+      return "Conflict";
+    case 411:
+      return "Length Required";
+    case 413:
+      return "Content Too Large";
+    case 415:
+      return "Unsupported Media Type";
     case 416:
       return "Range Not Satisfiable";
     case 421:
       return "Misdirected Request";
     case 431:
       return "Request Header Fields Too Large";
+    case 500:
+      return "Internal Server Error";
+    case 501:
+      return "Not Implemented";
     case 505:
       return "HTTP Version Not Supported";
     default:
@@ -115,13 +131,21 @@ struct Answer {
 /// The files of a folder, for requests with a host name of this machine.
 class Folder {
  public:
-  Folder(const fs::path& folder, int port) : root_(fs::canonical(folder)) {
+  Folder(const fs::path& folder, const std::map<std::string, fs::path>& originals, int port)
+      : recut(fs::canonical(folder), originals), root_(fs::canonical(folder)) {
     for (const char* name : {"127.0.0.1", "localhost"}) hosts_.push_back(fmt::format("{}:{}", name, port));
   }
 
-  Answer answer(const FileRequest& request) const {
+  /// `body`: of a POST request.
+  Answer answer(const FileRequest& request, const std::string& body) {
     if (request.status != 200) return refuse(request, request.status);
     if (std::find(hosts_.begin(), hosts_.end(), request.host) == hosts_.end()) return refuse(request, 421);
+    if (request.is_post) {
+      const RecutAnswer said = recut.begin(body);
+      Answer answer = begin(request, said.status, said.text.size(), "Content-Type: application/json; charset=utf-8\r\n");
+      answer.head += said.text;
+      return answer;
+    }
     const fs::path path = find_file(request.path);
     base::Descriptor file(path.empty() ? -1 : ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     struct stat about {};
@@ -147,6 +171,8 @@ class Folder {
     if (!request.is_head) answer.head += text;
     return answer;
   }
+
+  Recut recut;
 
  private:
   /// The file of a path, links followed; empty if absent or outside of the folder.
@@ -182,7 +208,7 @@ class Connection {
   double until_s() const { return until_s_; }
 
   /// Reads or writes once after poll(); false: the connection has ended.
-  bool advance(const Folder& folder, std::vector<char>& buffer) {
+  bool advance(Folder& folder, std::vector<char>& buffer) {
     if (state_ == State::kEnding) {
       const ssize_t count = ::recv(socket(), buffer.data(), buffer.size(), 0);
       return count > 0 || (count < 0 && is_early());
@@ -201,8 +227,8 @@ class Connection {
 
   static bool is_early() { return errno == EAGAIN || errno == EINTR; }
 
-  /// Starts the response to a complete or oversized head.
-  void find_request(const Folder& folder) {
+  /// Starts the response to a complete request or an oversized head.
+  void find_request(Folder& folder) {
     const std::size_t begin = std::min(taken_.find_first_not_of("\r\n"), taken_.size());
     std::size_t end = taken_.find("\n\r\n", begin), length = 3;
     if (const std::size_t other = taken_.find("\n\n", begin); other < end) end = other, length = 2;
@@ -213,15 +239,18 @@ class Connection {
     } else if (end == std::string::npos) {
       return;
     } else {
-      answer_ = folder.answer(parse_request(std::string_view(taken_).substr(begin, end + 1 - begin)));
-      taken_.erase(0, end + length);
+      const FileRequest request = parse_request(std::string_view(taken_).substr(begin, end + 1 - begin));
+      const std::size_t body = end + length;
+      if (request.status == 200 && taken_.size() - body < request.length) return;
+      answer_ = folder.answer(request, taken_.substr(body, request.length));
+      taken_.erase(0, body + request.length);
     }
     state_ = State::kSending;
     until_s_ = base::get_steady_s() + kPieceS;
   }
 
   /// Sends a piece of the response.
-  bool send(const Folder& folder, std::vector<char>& buffer) {
+  bool send(Folder& folder, std::vector<char>& buffer) {
     const char* from = answer_.head.data() + answer_.head_sent;
     std::size_t length = answer_.head.size() - answer_.head_sent;
     const bool is_head = length > 0;
@@ -279,13 +308,13 @@ std::pair<base::Descriptor, int> listen_at(int port) {
 
 class Server {
  public:
-  Server(const fs::path& folder, base::Descriptor socket, int port) : folder_(folder, port), socket_(std::move(socket)), buffer_(kPiece) {}
+  Server(Folder folder, base::Descriptor socket) : folder_(std::move(folder)), socket_(std::move(socket)), buffer_(kPiece) {}
 
   /// Serves until a signal; returns it.
   int run(const BlockedSignals& signals) {
     for (std::vector<pollfd> waited;;) {
       waited.assign({{signals.descriptor(), POLLIN, 0}, {socket_.get(), POLLIN, 0}});
-      double until_s = base::get_steady_s() + 3600.0;
+      double until_s = base::get_steady_s() + (folder_.recut.advance() ? kRecutS : 3600.0);
       for (const Connection& one : connections_) {
         waited.push_back({one.socket(), one.events(), 0});
         until_s = std::min(until_s, one.until_s());
@@ -334,12 +363,13 @@ class Server {
 
 }  // namespace
 
-int serve(const fs::path& folder, int port, const std::function<void(const std::string& address)>& on_ready) {
+int serve(const fs::path& folder, const std::map<std::string, fs::path>& originals, int port,
+          const std::function<void(const std::string& address)>& on_ready) {
   const BlockedSignals signals;
   std::error_code error;
   if (!fs::is_directory(folder, error)) throw SystemError(fmt::format("{}: this folder no longer exists", folder.string()));
   auto [socket, bound] = listen_at(port);
-  Server server(folder, std::move(socket), bound);
+  Server server(Folder(folder, originals, bound), std::move(socket));
   on_ready(fmt::format("http://127.0.0.1:{}/", bound));
   return server.run(signals);
 }

@@ -4,6 +4,7 @@
 Finds the programs in $CARILLON_BIN_DIR.
 """
 import http.client
+import json
 import os
 import pathlib
 import re
@@ -11,6 +12,7 @@ import resource
 import signal
 import socket
 import tempfile
+import time
 import unittest
 
 import serving
@@ -143,6 +145,14 @@ class Served(unittest.TestCase):
         cases = {
             "POST / HTTP/1.1\r\nHOST\r\nContent-Length: 9\r\n\r\n": 405,
             "DELETE / HTTP/1.1\r\nHOST\r\n\r\n": 405,
+            "PUT /recut HTTP/1.1\r\nHOST\r\nContent-Length: 2\r\n\r\n{}": 405,
+            "POST /recut HTTP/1.1\r\nHOST\r\n\r\n": 411,
+            "POST /recut HTTP/1.1\r\nHOST\r\nContent-Length: -1\r\n\r\n": 411,
+            "POST /recut HTTP/1.1\r\nHOST\r\nContent-Length: 999999999\r\n\r\n": 413,
+            # Forms of other origins can send these without asking first.
+            "POST /recut HTTP/1.1\r\nHOST\r\nContent-Length: 2\r\n\r\n{}": 415,
+            "POST /recut HTTP/1.1\r\nHOST\r\nContent-Type: text/plain; application/json\r\nContent-Length: 2\r\n\r\n{}": 415,
+            "POST /recut HTTP/1.1\r\nHost: evil.example\r\nContent-Type: application/json\r\nContent-Length: 2\r\n\r\n{}": 421,
             "GET / HTTP/1.1\r\nHOST\r\nHOST\r\n\r\n": 400,
             "GET / HTTP/1.1\r\n\r\n": 421,
             "GET / HTTP/3\r\nHOST\r\n\r\n": 505,
@@ -158,6 +168,40 @@ class Served(unittest.TestCase):
         }
         for text, status in cases.items():
             self.assertEqual(self.send(text), status, text[:60])
+        self.assert_well()
+
+    def ask_recut(self, text):
+        """(status, document) of a request to compute a body anew."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=WAIT_S)
+        connection.request("POST", "/recut", text, {"Content-Type": "application/json"})
+        response = connection.getresponse()
+        document = json.loads(response.read())
+        connection.close()
+        return response.status, document
+
+    def test_cuts_of_what_is_no_bank_are_refused(self):
+        for text in (
+            "",
+            "[" * 5000,
+            "{}",
+            '{"bank": 1, "cuts": []}',
+            '{"bank": "../outside.hdf", "cuts": []}',
+            '{"bank": "/etc/passwd", "cuts": []}',
+            '{"bank": "index.html", "cuts": []}',
+            '{"bank": "none.hdf", "cuts": []}',
+        ):
+            status, document = self.ask_recut(text)
+            self.assertEqual((status, list(document)), (400, ["error"]), text[:40])
+        # A file that only looks like a bank: the program says what is wrong, in the file of the result.
+        (self.folder / "false.hdf").write_bytes(b"CARILLON BANK 1.0\n")
+        status, document = self.ask_recut('{"bank": "false.hdf", "cuts": [[0, 0, 0, 0.01, 1e-4]]}')
+        self.assertEqual(status, 202)
+        until = time.monotonic() + WAIT_S
+        result = {"is_running": True}
+        while result.get("is_running") and time.monotonic() < until:
+            time.sleep(0.1)
+            result = json.loads(self.ask("/" + document["result"])[1])
+        self.assertIn("false.hdf", result["error"])
         self.assert_well()
 
     def test_large_requests_take_no_memory(self):
