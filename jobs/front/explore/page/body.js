@@ -62,6 +62,17 @@ export class ShownBody {
     this.setPose(position_m, rotation);
   }
 
+  /** Takes the surface of the body after a cut. */
+  setSurface(surface) {
+    this.coloured?.geometry.dispose();
+    this.geometry.dispose();
+    this.coloured = this.sketch = undefined;
+    Object.assign(this, { surface, box: findBox(surface), corners: makeCorners(surface), isColoured: false });
+    this.geometry = makeGeometry(this.corners);
+    this.material.needsUpdate = true;
+    this.show();
+  }
+
   makeMaterial(look) {
     const { opacity = 1, ...rest } = look;
     const material = new THREE.MeshPhysicalMaterial({ ...rest, side: THREE.DoubleSide, envMapIntensity: 0.9 });

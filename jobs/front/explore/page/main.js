@@ -112,7 +112,7 @@ async function addBodies({ about, scene }, audio, view, player) {
       supports: { on: said.on, joint: said.joint, loss: said.loss, supports: said.supports, held: said.held },
     });
     view.addBody(shown);
-    player.bodies.push({ name: said.name, bank, surface, shown, sound, look, about: about.bodies[i] });
+    player.bodies.push({ name: said.name, file: said.bank, bank, surface, shown, sound, look, about: about.bodies[i] });
   }
 }
 

@@ -8,6 +8,7 @@ import { makeWav, Recorder } from './recorder.js';
 const find = (id) => document.getElementById(id);
 const kEditS = 0.06; // interval of edits while a slider moves
 const kPlanS = 0.5;
+const kWaitS = 0.3; // between looks for a body that is computed
 
 /** Two significant digits, without an exponent. */
 const short = (value) => Number(value.toPrecision(2)).toString();
@@ -15,6 +16,19 @@ const describeCents = (cents) => (!Number.isFinite(cents) ? '–' : cents < 0.1 
 /** Rates [1/s] and times [s], with the digits of carillon-bank info. */
 const formatFigure = (value, digits) => (value === null ? '–' : Number.isFinite(value) ? Number(value.toPrecision(digits)).toString() : '∞');
 const times = (value) => (value === 1 ? 'unchanged' : `× ${value < 1 ? value.toFixed(2) : value.toFixed(value < 10 ? 2 : 0)}`);
+
+const describeChange = (cents) => `${cents >= 0 ? '+' : ''}${cents.toFixed(2)} cents`;
+
+/** The result in a file that says is_running until it is there. */
+async function waitForResult(file) {
+  for (;;) {
+    const answer = await fetch(file, { cache: 'no-store' });
+    if (!answer.ok) throw new Error(`${file} cannot be read (${answer.status})`);
+    const result = await answer.json();
+    if (!result.is_running) return result;
+    await new Promise((resolve) => setTimeout(resolve, 1000 * kWaitS));
+  }
+}
 
 export class Panel {
   constructor(page) {
@@ -119,6 +133,48 @@ export class Panel {
       body.edit.cuts.push([...body.shown.toMesh(place.point), this.radius * body.shown.box.size, 1e-3 * this.depth_mm]);
       this.edit();
     });
+    find('anew').addEventListener('click', () => {
+      find('anew').disabled = true;
+      this.computeAnew(this.current).catch((error) => this.sayAnew(error.message)).finally(() => this.showCutChange());
+    });
+  }
+  sayAnew(text) {
+    find('anew-state').textContent = text;
+    this.say(text);
+  }
+
+  /** Solves a body without the spots cut from it; by the server, else the page says by which command. */
+  async computeAnew(index) {
+    const body = this.player.bodies[index], { cuts } = body.edit, request = JSON.stringify({ bank: body.file, cuts }), begun = performance.now();
+    body.isComputed = true;
+    this.sayAnew(`computing ${body.name} …`);
+    try {
+      const answer = await fetch('recut', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: request }).catch(() => null);
+      if (!answer || [403, 404, 405, 501].includes(answer.status)) return this.offerCuts(body, request);
+      const said = await answer.json();
+      if (said.error) throw new Error(said.error);
+      const done = await waitForResult(said.result);
+      if (done.error) throw new Error(done.error);
+      const file = `${said.folder}/bank.hdf`, before = body.sound.modes.length;
+      await this.player.takeBank(index, await (await fetch(file)).arrayBuffer(), file);
+      const seconds = ((performance.now() - begun) / 1000).toFixed(1), lost = before - body.sound.modes.length;
+      const modes = lost === 0 ? '' : `; ${Math.abs(lost)} modes ${lost > 0 ? 'fewer' : 'more'}`;
+      this.sayAnew(`computed in ${seconds} s: mode 1 ${describeChange(done.modes[0].cents)}${modes}; files in ${said.folder}`);
+      body.places = undefined;
+      if (index === this.current) this.select(index, true);
+    } finally {
+      body.isComputed = false;
+    }
+  }
+  /** Where nothing solves: a file with the cuts, and the command that takes it. */
+  offerCuts(body, request) {
+    const name = body.file.replace(/^.*\//, '').replace(/\.hdf$/, ''), file = `${name}-cuts.json`, link = find('anew-file');
+    if (link.href) URL.revokeObjectURL(link.href);
+    Object.assign(link, { href: URL.createObjectURL(new Blob([request], { type: 'application/json' })), download: file, textContent: file });
+    link.click();
+    find('anew-command').querySelector('code').textContent = `carillon tune ${name}.hdf --cuts ${file} -o ${name}-cut`;
+    find('anew-command').hidden = false;
+    this.sayAnew('this server computes nothing; run this command next to the bank, and open the new one with carillon explore:');
   }
 
   /** Colours the selected body by the density of the mode at hand while the gesture is to cut. */
@@ -137,7 +193,8 @@ export class Panel {
   /** Change of the coloured mode by all cuts. */
   showCutChange() {
     const { edit, sound } = this.body, cents = sound.cut_cents?.[this.cutMode ?? 0] ?? 0, count = edit.cuts.length;
-    find('cut-change').textContent = count > 0 ? `${count} cut${count > 1 ? 's' : ''}: ${cents >= 0 ? '+' : ''}${cents.toFixed(2)} cents` : '';
+    find('cut-change').textContent = count > 0 ? `${count} cut${count > 1 ? 's' : ''}: ${describeChange(cents)}` : '';
+    find('anew').disabled = count === 0 || Boolean(this.body.isComputed);
   }
 
   goTo(index, isQuiet = false) {

@@ -91,6 +91,18 @@ export class Player extends EventTarget {
     };
   }
 
+  /** Gives a body another bank, of the same body without its cuts. file: where it is in the folder. */
+  async takeBank(index, bytes, file) {
+    const body = this.bodies[index], bank = await this.audio.addBank(bytes, file), { cuts, ...edits } = body.sound.edits;
+    const isSame = String(bank.triangles) === String(body.surface.triangles);
+    body.sound.bank = bank;
+    await body.sound.edit(edits);
+    Object.assign(body, { bank, file, surface: { vertices_m: bank.vertices_m, triangles: bank.triangles } });
+    body.edit.cuts = [];
+    body.about = { ...body.about, change: null, loudest: isSame ? body.about.loudest : undefined };
+    body.shown.setSurface(body.surface);
+  }
+
   /** One mode alone, or all again (null). */
   solo(index, mode) {
     const { sound } = this.bodies[index];
