@@ -18,6 +18,7 @@ from quantities import LENGTH_UNITS, read_quantity
 from sites import find_sites
 
 FIRST_ORDER = 0.05  # share of the wall that first order allows to cut
+COARSE_CENTS = 10.0  # bar of a mode whose changes are off by some 10 % (docs/reports/tune.md)
 
 
 def read_point(text):
@@ -71,6 +72,9 @@ class Map:
             self.sites = solver.read_sites(group, numpy.arange(len(bank["modes/eigenvalue"])))
             self.skin = skin.Skin(bank["mesh/vertices"][:], bank["mesh/triangles"][:], self.sites)
             self.parameters = json.loads(group["parameters"][()].rstrip(b"\0") or "[]")
+            bars = bank["modes/corrected_error_cents"][:]
+            bars[: len(group["by_parameter"])] = group.get("own_error_cents", bars)[: len(group["by_parameter"])]
+            self.bar_cents = numpy.where(numpy.isfinite(bars), bars, numpy.inf)
             self.poisson_ratio = float(bank["material/poisson_ratio"][()])
             job = json.loads(bank["provenance"][()].rstrip(b"\0"))
         while "of" in job:  # a packed or edited bank
@@ -128,6 +132,18 @@ class Map:
         depth = numpy.where(is_face, 0.5 * share * self.thickness_m, 0.0)
         return -self.calc_changes(depth) * math.log(2) / 1200 / share
 
+    def check_mesh(self):
+        """A warning about modes that the mesh has not resolved, or none."""
+        coarse = [k for k in range(self.count) if self.bar_cents[k] > COARSE_CENTS]
+        if not coarse:
+            return []
+        names = ", ".join(str(k + 1) for k in coarse[:8]) + (", ..." if len(coarse) > 8 else "")
+        one = len(coarse) == 1
+        return [
+            f"warning: the mesh is coarse for mode{'' if one else 's'} {names}: error bars of up to {self.bar_cents[coarse].max():.0f} cents,"
+            f' changes may be off by 10 % and more; compute the bank again with "accuracy_cents": 5, or two elements across the wall'
+        ]
+
     def check_cut(self, depth, cut_m):
         """A warning about the first order, or none. InputError where nothing would be left."""
         share = self.skin.check_share(depth, f"--cut {1e3 * cut_m:g}mm", FIRST_ORDER)
@@ -144,18 +160,20 @@ def show_place(place):
 
 
 def list_spot(found, changes, out):
-    out.append(f"{'mode':>5} {'Hz':>10}  {'cents':>8}  kind")
+    out.append(f"{'mode':>5} {'Hz':>10} {'bar':>6}  {'cents':>8}  kind")
     for k in range(found.count):
-        out.append(f"{k + 1:>5} {found.freq_hz[k]:>10.2f}  {changes[k]:>+8.2f}  {found.kind[k]}")
+        out.append(f"{k + 1:>5} {found.freq_hz[k]:>10.2f} {found.bar_cents[k]:>6.1f}  {changes[k]:>+8.2f}  {found.kind[k]}")
 
 
 def list_whole(found, changes, constants, out):
     trusted = numpy.flatnonzero(~found.sites.doubtful)
-    out.append(f"{'mode':>5} {'Hz':>10}  {'cents':>8}  {'lowered most at [m]':<34}{'raised most at [m]':<34}kind")
+    out.append(f"{'mode':>5} {'Hz':>10} {'bar':>6}  {'cents':>8}  {'lowered most at [m]':<34}{'raised most at [m]':<34}kind")
     for k in range(found.count):
         density = found.sites.density[trusted, k]
         low, high = (show_place(found.place[trusted[i]]) for i in (density.argmin(), density.argmax()))
-        out.append(f"{k + 1:>5} {found.freq_hz[k]:>10.2f}  {changes[k]:>+8.2f}  {low:<34}{high:<34}{found.kind[k]}")
+        out.append(
+            f"{k + 1:>5} {found.freq_hz[k]:>10.2f} {found.bar_cents[k]:>6.1f}  {changes[k]:>+8.2f}  {low:<34}{high:<34}{found.kind[k]}"
+        )
     width = max(len(name) for name, _ in constants) + 2
     note = "cents by 1 % of a constant (Poisson's ratios: by 0.01); shear modulus: at constant Young's modulus"
     out += ["", note, f"{'mode':>5}" + "".join(f"{name:>{width}}" for name, _ in constants)]
@@ -264,8 +282,15 @@ def run(arguments):
             draw = programs.find_program(arguments.bin, "carillon-draw")
             solver.run_program([draw, "sensitivities", arguments.bank, "-o", path, "--modes", arguments.mode])
         out.append(str(path))
+    out += found.check_mesh()
     rows = [
-        {"mode": k + 1, "hz": found.freq_hz[k], "kind": found.kind[k], "cents": changes[k]}
+        {
+            "mode": k + 1,
+            "hz": found.freq_hz[k],
+            "kind": found.kind[k],
+            "cents": changes[k],
+            "bar_cents": float(found.bar_cents[k]) if math.isfinite(found.bar_cents[k]) else None,
+        }
         | {name: values[k] for name, values in constants}
         for k in range(found.count)
     ]

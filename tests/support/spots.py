@@ -17,6 +17,10 @@ def measure_spot(solve, body, p, radius_m, at_m):
     normal, _ = shapes.find_normals(nodes, triangles)
     surface = numpy.unique(triangles)
     near = surface[numpy.linalg.norm(nodes[surface] - at_m, axis=1).argmin()]
+    corners = nodes[triangles]
+    facing = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    one_side = triangles[facing @ normal[near] > 0.5 * numpy.linalg.norm(facing, axis=1)]
+    normal, _ = shapes.find_normals(nodes, one_side)  # an edge moves on this side alone
     share = numpy.linalg.norm(nodes[surface] - nodes[near], axis=1) / radius_m
     depth = numpy.where(normal[surface] @ normal[near] > 0.5, grid.fade(share), 0)
     field = grid.spread(nodes, body.tets, surface, -depth[:, None] * normal[surface])

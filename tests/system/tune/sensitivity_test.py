@@ -63,10 +63,14 @@ class Sensitivity(unittest.TestCase):
 
     def compare(self, stated, above, below, step, median=0.01, worst=0.05):
         """stated: d ln f / d parameter; above, below: frequencies at the parameter +- step."""
-        true = numpy.log(above / below) / (2 * step)
-        error = numpy.abs(numpy.array(stated) - true) / numpy.maximum(numpy.abs(true), 0.05 * numpy.abs(true).max())
+        error = self.find_error(stated, above, below, step)
         self.assertLess(numpy.median(error), median)
         self.assertLess(error.max(), worst)
+
+    def find_error(self, stated, above, below, step):
+        """Relative to a mode's own derivative, or to 5 % of the largest."""
+        true = numpy.log(above / below) / (2 * step)
+        return numpy.abs(numpy.array(stated) - true) / numpy.maximum(numpy.abs(true), 0.05 * numpy.abs(true).max())
 
     def test_constants_and_thickness_are_those_of_new_solves(self):
         modes = self.ask("bar.hdf")
@@ -134,6 +138,17 @@ class Sensitivity(unittest.TestCase):
         root = json.loads(data[20 : 20 + size])
         self.assertEqual([one["count"] for one in root["accessors"]], [len(density)] * 3 + [3 * triangles])
         self.assertEqual((self.folder / "map.png").read_bytes()[:4], b"\x89PNG")
+
+    def test_a_mesh_with_one_element_across_is_warned_of(self):
+        """Where the warning is missing, changes are right; the modes it names are wrong by more than those."""
+        body = {"shape": "bar", "length_m": 0.3, "width_m": 0.014, "thickness_m": 0.01}
+        for name, mesh, warned in (("coarse", {"nodes": 400}, True), ("fine", {"nodes": 8000}, False)):
+            moved = [self.solve("moved", body | mesh | {"thickness_m": 0.01 * share}, max_modes=6)[:6] for share in (1.005, 0.995)]
+            self.solve(name, body | mesh, max_modes=8, sensitivities=6)
+            document = json.loads(self.run_command(f"{name}.hdf", "--json"))
+            error = self.find_error([mode["thickness"] for mode in document["modes"]][:6], *moved, 0.005)
+            self.assertEqual(any("accuracy_cents" in note for note in document["notes"]), warned, document["notes"])
+            self.assertEqual(error.max() > 0.05, warned, error)
 
     def test_a_spot_changes_modes_where_they_move_or_bend(self):
         # In the middle the first bending mode bends most: less material lowers it; at the end it only moves: less raises it.
