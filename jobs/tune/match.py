@@ -19,7 +19,6 @@ from errors import InputError
 from quantities import LENGTH_UNITS, MASS_UNITS, read_quantity
 
 COLUMNS = {"hz": True, "sd_hz": False, "t60_s": False, "sd_t60_s": False}  # is it required
-T60_DECAY = math.log(1000.0)
 
 
 def add_command(commands):
@@ -68,7 +67,7 @@ def read_peaks(path):
         if not 1 <= values.get("hz", 0) <= 1e6:
             raise InputError(f"{path}:{number}: hz is missing or beyond 1 to 1e6; {remedy}")
         hz, t60_s = values["hz"], values.get("t60_s")
-        decay = T60_DECAY / t60_s if t60_s else None
+        decay = sound.T60_DECAY / t60_s if t60_s else None
         sd_decay = decay * values["sd_t60_s"] / t60_s if t60_s and "sd_t60_s" in values else math.inf
         peaks.append(sound.Peak(hz, values.get("sd_hz", 0.0), decay, sd_decay))
     if not peaks:
@@ -234,7 +233,7 @@ class Match:
             if mode in peak_of:
                 peak = self.peaks[peak_of[mode]]
                 off = constants.TO_CENTS * (math.log(peak.freq_hz) - logs[mode])
-                t60 = f"{T60_DECAY / peak.decay_per_s:.3g}" if peak.decay_per_s else "-"
+                t60 = f"{sound.T60_DECAY / peak.decay_per_s:.3g}" if peak.decay_per_s else "-"
                 cells += [f"{peak.freq_hz:.2f}", f"{off:+.1f}", t60, f"{peak.level_db:.0f}" if self.hearing else "-"]
             else:
                 cells += ["-", "-", "-", "-"]
@@ -271,7 +270,7 @@ class Match:
             writer = csv.writer(stream)
             writer.writerow([*COLUMNS, "mode", "level_db"])
             for k, peak in enumerate(self.peaks):
-                t60 = T60_DECAY / peak.decay_per_s if peak.decay_per_s else math.nan
+                t60 = sound.T60_DECAY / peak.decay_per_s if peak.decay_per_s else math.nan
                 sd_t60 = t60 * peak.sd_per_s / peak.decay_per_s if peak.decay_per_s and math.isfinite(peak.sd_per_s) else math.nan
                 cells = [f"{value:.6g}" if value > 0 else "" for value in (peak.sd_hz, t60, sd_t60)]
                 writer.writerow([f"{peak.freq_hz:.8g}", *cells, self.mode_of.get(k, -1) + 1 or "", f"{peak.level_db:.1f}"])

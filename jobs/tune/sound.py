@@ -2,6 +2,7 @@
 
 Method: starts from spectra of three windows; then all damped sinusoids together by least squares in time, with the amplitudes eliminated
 (variable projection: Golub and Pereyra 1973, Jacobian of Kaufman 1975). Lines left in the residual join, and all are fitted again.
+In a room, decays are fitted once more, with the room's sound as noise of known covariance (RoomDecays).
 """
 import dataclasses
 import math
@@ -9,7 +10,9 @@ import warnings
 
 import numpy
 import scipy.io.wavfile
+import scipy.linalg
 import scipy.ndimage
+import scipy.optimize
 
 from errors import InputError
 
@@ -22,6 +25,10 @@ MIN_SIGNAL = 4.0  # amplitude over its standard error
 TORN = 0.5  # lines closer than this share of their half width are one mode, of which nothing would be known
 SKIP_S, MIN_S = 0.002, 0.15
 FIT_S, FIT_DECAYS = (0.4, 0.8), 3.0  # length of the fit: so many times 1 / d of the slowest line, within these limits
+T60_DECAY = math.log(1000.0)
+ROOM_T60_S, ROOM_LEVELS = (0.15, 0.25, 0.4, 0.6, 0.9, 1.4), tuple(10 ** (db / 10) for db in (-28, -24, -20, -16, -12, -8, -4))
+ROOM_STEP_S = 0.008  # of a line's amplitudes
+ROOM_BAND_HZ, ROOM_MINOR = 70.0, 0.5  # lines so near, weaker by this factor, are the flicker of a line
 ROOM_SHARE = 0.2  # standard error of a decay in a room, of the decay
 MAX_WAV_S = 600.0
 
@@ -245,6 +252,76 @@ def find_room(residual, samples, rate):
     return min(60 / max(-slope, 6.0), 10.0)
 
 
+class RoomDecays:
+    """Decays of lines with the sound of the room as noise, by maximum likelihood.
+
+    A response of the room that is noise under exp(-r t) adds A exp(-d t) W(t) to a line A exp(-d t), W Brownian with the variance
+    R 2 r (exp(2 (d - r) t) - 1) / (2 (d - r)); R: energy of the room over that of the direct sound. So the covariance of the line's
+    amplitudes in time is known, up to r and R, which all lines share."""
+
+    def __init__(self, sines, modes):
+        """sines: at its least squares; modes: (5, K) of it."""
+        step = max(1, round(ROOM_STEP_S * sines.rate))
+        self.count = len(sines.samples) // step
+        self.time_s = (numpy.arange(self.count) + 0.5) * step / sines.rate
+        hz, decay, _, _, size = modes
+        half = len(hz)
+        sines.set(numpy.concatenate([2 * math.pi * hz, decay]))
+        self.lines = []
+        for k in numpy.flatnonzero(decay > 0.5):
+            near = numpy.flatnonzero(numpy.abs(hz - hz[k]) < ROOM_BAND_HZ)
+            if (size[near] > ROOM_MINOR * size[k]).sum() > 1:
+                continue  # a pair, or the flicker of a stronger line
+            own = sines.residual + sines.basis[:, [*near, *near + half]] @ sines.parts[[*near, *near + half]]
+            turned = 2 * own * numpy.exp(-2j * math.pi * hz[k] * sines.time_s)
+            blocks = turned[: self.count * step].reshape(self.count, step).mean(axis=1)
+            rest = numpy.abs(numpy.diff(blocks, 2, prepend=0, append=0)) ** 2 / 6
+            rest[[0, -1]] = rest[[1, -2]]
+            noise = numpy.maximum(scipy.ndimage.uniform_filter1d(rest, 9), 1e-12 * size[k] ** 2)
+            self.lines.append((int(k), blocks, decay[k], size[k], noise))
+
+    def calc_cost(self, line, decay, turn, rate, share):
+        """- ln of the likelihood of a line. turn: of its frequency [rad/s]; rate: r; share: R."""
+        _, blocks, _, size, noise = line
+        mean = numpy.exp(-(decay + 1j * turn) * self.time_s)
+        first = numpy.minimum.outer(self.time_s, self.time_s)
+        gap = 2 * (decay - rate) if abs(decay - rate) > 1e-6 else 1e-6
+        walk = 2 * rate * share * numpy.expm1(numpy.minimum(gap * first, 60.0)) / gap
+        decays = numpy.exp(-decay * self.time_s)
+        factor = scipy.linalg.cholesky(size**2 * walk * numpy.outer(decays, decays) + numpy.diag(noise), lower=True)
+        white = scipy.linalg.solve_triangular(factor, numpy.stack([blocks, mean], axis=1), lower=True)
+        left = white[:, 0] - white[:, 1] * (numpy.vdot(white[:, 1], white[:, 0]) / numpy.vdot(white[:, 1], white[:, 1]).real)
+        return (numpy.abs(left) ** 2).sum() + 2 * numpy.log(numpy.diag(factor)).sum()
+
+    def fit(self):
+        """({line: (decay, standard error)}, T60 of the room [s])."""
+        at = {line[0]: (line[2], 0.0) for line in self.lines}
+        for _ in range(2):
+            costs = {
+                (t60, share): sum(self.calc_cost(line, *at[line[0]], T60_DECAY / t60, share) for line in self.lines)
+                for t60 in ROOM_T60_S
+                for share in ROOM_LEVELS
+            }
+            t60, share = min(costs, key=costs.get)
+            for line in self.lines:
+                start = numpy.array(at[line[0]])
+                simplex = start + 0.2 * start[0] * numpy.array([[0, 0], [1, 0], [0, 1]])
+                found = scipy.optimize.minimize(
+                    lambda x, line=line: self.calc_cost(line, abs(x[0]), x[1], T60_DECAY / t60, share),
+                    start,
+                    method="Nelder-Mead",
+                    options={"initial_simplex": simplex, "maxfev": 60, "xatol": 1e-3, "fatol": 1e-2},
+                )
+                at[line[0]] = (abs(found.x[0]), found.x[1])
+        result = {}
+        for line in self.lines:
+            decay, turn = at[line[0]]
+            around = [self.calc_cost(line, decay * (1 + move), turn, T60_DECAY / t60, share) for move in (-0.1, 0.0, 0.1)]
+            bend = (around[0] - 2 * around[1] + around[2]) / (0.1 * decay) ** 2
+            result[line[0]] = (decay, bend**-0.5 if bend > 0 else decay)
+        return result, t60
+
+
 def is_hum(hz):
     """Next to a multiple of 50 or 60 Hz."""
     return hz < 1500 and min(abs(hz / mains - round(hz / mains)) * mains for mains in (50, 60)) < 0.5
@@ -272,6 +349,11 @@ def hear(samples, rate):
             break
         modes, room_t60_s = found, left_t60_s
     hz, decay, sd_hz, sd_decays, size = modes
+    if room_t60_s:
+        room = RoomDecays(sines, modes)
+        found, room_t60_s = room.fit() if room.lines else ({}, room_t60_s)
+        for k, (value, sd) in found.items():
+            decay[k], sd_decays[k] = value, sd
     peaks = []
     steady = []
     for k in numpy.argsort(hz):
