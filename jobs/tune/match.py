@@ -13,6 +13,7 @@ import job_file
 import losses
 import measuring
 import programs
+import results
 import solver
 import sound
 from errors import InputError
@@ -312,12 +313,8 @@ def make_spectrum(hearing, low, high, columns=1500):
 
 def run(options):
     """Matches, writes the files, and returns (text, JSON object)."""
-    out = pathlib.Path(options.out)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{out}: cannot create folder: {error.strerror}; give another one with -o") from None
-    made = Match(options)
-    made.write(out)
+    with results.make_folder(options.out) as out:
+        made = Match(options)
+        made.write(out)
     files = [str(out / name) for name in ("material.json", "peaks.csv", "spectrum.svg")]
     return made.describe() + "\n" + "\n".join(files), made.to_json() | {"files": files}

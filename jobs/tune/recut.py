@@ -119,15 +119,13 @@ def read_job(path, folder, binaries):
 def run(options):
     """(text, document) of carillon tune --cuts."""
     cuts = read_cuts(options.cuts)
-    with tempfile.TemporaryDirectory(prefix="carillon-tune-") as name:
+    with results.make_folder(options.out) as out, tempfile.TemporaryDirectory(prefix="carillon-tune-") as name:
         folder = pathlib.Path(name)
         job, file = read_job(options.job, folder, options.bin)
         run = solver.Solver(programs.find_program(options.bin), file)
         mesh = shapes.read_mesh(job, file, folder, programs.find_program(options.bin, "carillon-mesh"))
         outcome, share, volume_m3 = solve_cut(run, job, mesh, cuts, options.cuts, folder)
         table, document, note = describe(outcome, share, volume_m3)
-        out = pathlib.Path(options.out)
-        out.mkdir(parents=True, exist_ok=True)
         lines = table.splitlines()
         results.write_files(out, outcome, options.job, [lines[0], *lines[2:], note])
     (out / "table.txt").write_text(f"{table}\n{note}\n")

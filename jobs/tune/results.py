@@ -1,4 +1,5 @@
-"""Files of a design of carillon tune."""
+"""Output folders, and the files of a design of carillon tune."""
+import contextlib
 import json
 import pathlib
 import shutil
@@ -7,8 +8,27 @@ import numpy
 
 import drawing
 import grid
+from errors import InputError
 
 MESH = "body.msh"
+
+
+@contextlib.contextmanager
+def make_folder(name):
+    """The path of an output folder, made before the work; without it again where that fails. InputError."""
+    path = pathlib.Path(name)
+    is_new = not path.exists()
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot create folder: {error.strerror}; give another one with -o") from None
+    try:
+        yield path
+    except BaseException:
+        if is_new:
+            with contextlib.suppress(OSError):  # it is not empty
+                path.rmdir()
+        raise
 
 
 def write_files(out, outcome, job_file, table):

@@ -18,7 +18,7 @@ MIN_SHAPE = 0.6  # MAC of a followed mode
 MAX_STEPS, MIN_SHARE = 14, 0.1
 SLOW, MEMORY = 0.95, 2  # a search ends when twice so many steps leave more than this of the residual
 FINE = 2.0  # elements of the fine mesh along an edge, of the coarse
-SPARE_MODES = 6  # above the highest wish: modes that may come down
+MODES, SPARE_MODES = 24, 6  # of the first solve; above the highest wish: those that may come down
 SMOOTH, DAMPING = 0.02, 0.01  # weights of jumps and of the step, of the largest derivative
 WIDEST_PAIR, MAX_CLOSING, DEAR = 60.0, 6, 1e3  # cents of a beat; steps; price of a cent that is left, of all the volume
 CLEAR = 1.2  # a mode that must stay away is sent so much further
@@ -90,7 +90,7 @@ class Search:
 
     def __init__(self, run, wishes, aparts, cents, folder, say):
         self.run, self.wishes, self.aparts, self.cents, self.folder, self.say = run, wishes, aparts, cents, folder, say
-        self.modes = 24
+        self.modes = MODES
         self.steps = []
         self.missed = None  # of find_jacobian()
         self.set_wishes(wishes)
@@ -231,7 +231,13 @@ class Search:
         """Coarse mesh, then the fine one. make_body: fineness to body, the same where it has one mesh."""
         coarse, fine = make_body(1.0), make_body(FINE)
         enough = self.cents if fine is coarse else max(COARSE_CENTS, self.cents)
-        first = self.start(coarse, p)
+        try:
+            first = self.start(coarse, p)
+        except targets.InputError:  # on a coarse mesh a round body may not look round, and its modes have no kinds
+            if fine is coarse:
+                raise
+            coarse, enough, self.modes = fine, self.cents, MODES
+            first = self.start(fine, p)
         body = coarse.leave_doubtful(first.solution, p)
         state = self.descend(body, first, enough, "coarse")
         if fine is not coarse and self.is_reached(body, state, enough):

@@ -111,8 +111,9 @@ def find_groups(solution, wishes):
             continue
         found = [[m] for m in range(len(solution.kinds))] if kind == "mode" else find_kind(solution, kind)
         if len(found) < int(number or 1):
-            names = ", ".join(dict.fromkeys(name.split(",")[0] for name in solution.kinds if name))
-            raise InputError(f"{wish.mode}: not among the lowest {len(solution.kinds)} modes of this body; it has: {names}")
+            names = ", ".join(dict.fromkeys(name.split(",")[0] for name in solution.kinds if name.strip("-")))
+            names = f"it has: {names}" if names else "their kinds are unknown: name them by numbers, like mode 1"
+            raise InputError(f"{wish.mode}: not among the lowest {len(solution.kinds)} modes of this body; {names}")
         groups.append(found[int(number or 1) - 1])
     taken = [m for group in groups for m in group]
     if len(set(taken)) != len(taken):

@@ -90,15 +90,13 @@ def run(options):
     wall, tolerance = options.wall, options.tolerance
     say = (lambda text: None) if options.json else (lambda text: print(text, flush=True))
     solver = Solver(programs.find_program(options.bin), options.job)
-    folder = tempfile.TemporaryDirectory(prefix="carillon-tune-")
-    out = pathlib.Path(options.out)
-    out.mkdir(parents=True, exist_ok=True)
-    with folder:
+    with results.make_folder(options.out) as out, tempfile.TemporaryDirectory(prefix="carillon-tune-") as name:
+        folder = pathlib.Path(name)
         aparts = [targets.read_apart(text) for text in options.apart]
-        search = steps.Search(solver, [], aparts, options.cents, pathlib.Path(folder.name), say)
+        search = steps.Search(solver, [], aparts, options.cents, folder, say)
         mesher = programs.find_program(options.bin, "carillon-mesh")
         if options.close_pairs or options.map:
-            mesh = shapes.read_mesh(job, options.job, folder.name, mesher)
+            mesh = shapes.read_mesh(job, options.job, folder, mesher)
             body = shapes.make_map(job, mesh, options.knots or 42, options.most, options.remove or "all", wall)
             make_body, start_p = lambda fineness: body, numpy.zeros(len(body.names))
         elif options.outline:
@@ -107,7 +105,7 @@ def run(options):
             start_p = numpy.zeros(knots)
         elif options.free:
             limits = shapes.read_limits(options.free, job)
-            make_mesh = lambda changed: shapes.read_mesh(changed, options.job, folder.name, mesher)
+            make_mesh = lambda changed: shapes.read_mesh(changed, options.job, folder, mesher)
             make_body = lambda fineness: shapes.Keys(job, limits, fineness, make_mesh)
             start_p = numpy.log([job["body"][name.removeprefix("body.")] for name in limits])
         else:
@@ -171,7 +169,7 @@ def report(options, outcome, wishes, tolerance, solver, out):
         "",
         measuring.format_table(depths),
         "cents: for 0.1 mm more" + ("" if body.is_length.all() else ", of other values 1 %"),
-        f"{solver.solves} solves, {cpu_s:.1f} CPU s",
+        f"{solver.solves} solve{'s' if solver.solves != 1 else ''}, {cpu_s:.1f} CPU s",
     ]
     if not outcome.reached:
         text.append(f"not reached: {outcome.obstacle}")
