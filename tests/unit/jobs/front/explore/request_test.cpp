@@ -44,6 +44,20 @@ TEST(Requests, ThatCannotBeServedSayWhy) {
   }
 }
 
+TEST(Requests, ToComputeABodyAreJsonOfBoundedLength) {
+  const std::string begin = "POST /recut HTTP/1.1\r\nHost: a\r\n", json = "Content-Type: Application/JSON; charset=utf-8\r\n";
+  const FileRequest request = parse_request(begin + json + "Content-Length: 12\r\n");
+  EXPECT_EQ(request.status, 200);
+  EXPECT_TRUE(request.is_post);
+  EXPECT_EQ(request.length, 12U);
+  EXPECT_FALSE(request.is_reusable);
+  EXPECT_EQ(parse_request(begin + json).status, 411);
+  EXPECT_EQ(parse_request(begin + json + "Content-Length: x\r\n").status, 411);
+  EXPECT_EQ(parse_request(begin + json + "Content-Length: 1000000\r\n").status, 413);
+  EXPECT_EQ(parse_request(begin + "Content-Length: 12\r\n").status, 415);
+  EXPECT_FALSE(parse_request("GET /recut HTTP/1.1\r\nHost: a\r\n").is_post);
+}
+
 TEST(Requests, WithABodyOrOfHttp10EndTheirConnection) {
   for (const char* head : {"GET / HTTP/1.0\r\n", "GET / HTTP/1.1\r\nConnection: Close\r\n", "GET / HTTP/1.1\r\nContent-Length: 5\r\n",
                            "GET / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n"}) {
