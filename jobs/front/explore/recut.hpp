@@ -1,4 +1,4 @@
-// Bodies that were cut on the page, computed anew.
+// Bodies that were cut on the page, computed again.
 #pragma once
 
 #include <sys/types.h>

@@ -1,4 +1,4 @@
-// HTTP/1.1 requests for files, and those to compute a body anew.
+// HTTP/1.1 requests for files, and those to compute a body again.
 #pragma once
 
 #include <cstdint>

@@ -475,7 +475,7 @@ class PageTest(unittest.TestCase):
         page.mouse("mouseReleased", round(spot["x"]), round(spot["y"]), "left", clickCount=1)
         page.wait_for("carillon.player.bodies[0].sound.cut_cents?.length === 4")
 
-    def test_a_cut_body_is_computed_anew(self):
+    def test_a_cut_body_is_computed_again(self):
         server, said = serving.start("cut.hdf", "-o", "cut-served", cwd=self.root)
         self.addCleanup(server.stdout.close)
         self.addCleanup(server.wait)
@@ -485,7 +485,7 @@ class PageTest(unittest.TestCase):
         page.wait_for("document.documentElement.dataset.state === 'ready'", timeout_s=100)
         modes = "carillon.player.bodies[0].sound.modes.map((mode) => mode.freq_hz)"
         before = numpy.array(page.evaluate(modes))
-        self.assertTrue(page.evaluate("document.getElementById('anew').disabled"))
+        self.assertTrue(page.evaluate("document.getElementById('again').disabled"))
         for number in (1, 2):  # the second spot is cut from the body of the first
             page.evaluate(
                 "document.getElementById('depth').value = 0.1; document.getElementById('depth').dispatchEvent(new Event('input'))"
@@ -493,9 +493,9 @@ class PageTest(unittest.TestCase):
             self.cut(page)
             cuts = page.evaluate("carillon.panel.body.edit.cuts")
             cents = numpy.array(page.evaluate("carillon.player.bodies[0].sound.cut_cents"))
-            page.wait_for("!document.getElementById('anew').disabled")
-            page.evaluate("document.getElementById('anew').click()")
-            page.wait_for(f"document.getElementById('anew-state').textContent.includes('recut-{number}')", timeout_s=60)
+            page.wait_for("!document.getElementById('again').disabled")
+            page.evaluate("document.getElementById('again').click()")
+            page.wait_for(f"document.getElementById('again-state').textContent.includes('recut-{number}')", timeout_s=60)
             after = numpy.array(page.evaluate(modes))
             self.assertEqual(page.evaluate("carillon.panel.body.edit.cuts"), [])
             solved = 1200 * numpy.log2(after[:4] / before[:4])
@@ -519,10 +519,10 @@ class PageTest(unittest.TestCase):
         )
         self.cut(page)
         cuts = page.evaluate("carillon.panel.body.edit.cuts")
-        page.wait_for("!document.getElementById('anew').disabled")
-        page.evaluate("document.getElementById('anew').click()")
-        page.wait_for("!document.getElementById('anew-command').hidden")
-        words = page.evaluate("document.querySelector('#anew-command code').textContent").split()
+        page.wait_for("!document.getElementById('again').disabled")
+        page.evaluate("document.getElementById('again').click()")
+        page.wait_for("!document.getElementById('again-command').hidden")
+        words = page.evaluate("document.querySelector('#again-command code').textContent").split()
         self.assertEqual(words, "carillon tune cut.hdf --cuts cut-cuts.json -o cut-cut".split())
         page.wait_for("window.written")
         text = page.evaluate("window.written")

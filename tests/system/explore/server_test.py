@@ -171,7 +171,7 @@ class Served(unittest.TestCase):
         self.assert_well()
 
     def ask_recut(self, text):
-        """(status, document) of a request to compute a body anew."""
+        """(status, document) of a request to compute a body again."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=WAIT_S)
         connection.request("POST", "/recut", text, {"Content-Type": "application/json"})
         response = connection.getresponse()

@@ -133,21 +133,21 @@ export class Panel {
       body.edit.cuts.push([...body.shown.toMesh(place.point), this.radius * body.shown.box.size, 1e-3 * this.depth_mm]);
       this.edit();
     });
-    find('anew').addEventListener('click', () => {
-      find('anew').disabled = true;
-      this.computeAnew(this.current).catch((error) => this.sayAnew(error.message)).finally(() => this.showCutChange());
+    find('again').addEventListener('click', () => {
+      find('again').disabled = true;
+      this.computeAgain(this.current).catch((error) => this.sayAgain(error.message)).finally(() => this.showCutChange());
     });
   }
-  sayAnew(text) {
-    find('anew-state').textContent = text;
+  sayAgain(text) {
+    find('again-state').textContent = text;
     this.say(text);
   }
 
   /** Solves a body without the spots cut from it; by the server, else the page says by which command. */
-  async computeAnew(index) {
+  async computeAgain(index) {
     const body = this.player.bodies[index], { cuts } = body.edit, request = JSON.stringify({ bank: body.file, cuts }), begun = performance.now();
     body.isComputed = true;
-    this.sayAnew(`computing ${body.name} …`);
+    this.sayAgain(`computing ${body.name} …`);
     try {
       const answer = await fetch('recut', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: request }).catch(() => null);
       if (!answer || [403, 404, 405, 501].includes(answer.status)) return this.offerCuts(body, request);
@@ -159,7 +159,7 @@ export class Panel {
       await this.player.takeBank(index, await (await fetch(file)).arrayBuffer(), file);
       const seconds = ((performance.now() - begun) / 1000).toFixed(1), lost = before - body.sound.modes.length;
       const modes = lost === 0 ? '' : `; ${Math.abs(lost)} modes ${lost > 0 ? 'fewer' : 'more'}`;
-      this.sayAnew(`computed in ${seconds} s: mode 1 ${describeChange(done.modes[0].cents)}${modes}; files in ${said.folder}`);
+      this.sayAgain(`computed in ${seconds} s: mode 1 ${describeChange(done.modes[0].cents)}${modes}; files in ${said.folder}`);
       body.places = undefined;
       if (index === this.current) this.select(index, true);
     } finally {
@@ -168,13 +168,13 @@ export class Panel {
   }
   /** Where nothing solves: a file with the cuts, and the command that takes it. */
   offerCuts(body, request) {
-    const name = body.file.replace(/^.*\//, '').replace(/\.hdf$/, ''), file = `${name}-cuts.json`, link = find('anew-file');
+    const name = body.file.replace(/^.*\//, '').replace(/\.hdf$/, ''), file = `${name}-cuts.json`, link = find('again-file');
     if (link.href) URL.revokeObjectURL(link.href);
     Object.assign(link, { href: URL.createObjectURL(new Blob([request], { type: 'application/json' })), download: file, textContent: file });
     link.click();
-    find('anew-command').querySelector('code').textContent = `carillon tune ${name}.hdf --cuts ${file} -o ${name}-cut`;
-    find('anew-command').hidden = false;
-    this.sayAnew('this server computes nothing; run this command next to the bank, and open the new one with carillon explore:');
+    find('again-command').querySelector('code').textContent = `carillon tune ${name}.hdf --cuts ${file} -o ${name}-cut`;
+    find('again-command').hidden = false;
+    this.sayAgain('this server computes nothing; run this command next to the bank, and open the new one with carillon explore:');
   }
 
   /** Colours the selected body by the density of the mode at hand while the gesture is to cut. */
@@ -194,7 +194,7 @@ export class Panel {
   showCutChange() {
     const { edit, sound } = this.body, cents = sound.cut_cents?.[this.cutMode ?? 0] ?? 0, count = edit.cuts.length;
     find('cut-change').textContent = count > 0 ? `${count} cut${count > 1 ? 's' : ''}: ${describeChange(cents)}` : '';
-    find('anew').disabled = count === 0 || Boolean(this.body.isComputed);
+    find('again').disabled = count === 0 || Boolean(this.body.isComputed);
   }
 
   goTo(index, isQuiet = false) {
