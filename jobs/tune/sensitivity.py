@@ -140,8 +140,8 @@ class Map:
         names = ", ".join(str(k + 1) for k in coarse[:8]) + (", ..." if len(coarse) > 8 else "")
         one = len(coarse) == 1
         return [
-            f"warning: the mesh is coarse for mode{'' if one else 's'} {names}: error bars of up to {self.bar_cents[coarse].max():.0f} cents,"
-            f' changes may be off by 10 % and more; compute the bank again with "accuracy_cents": 5, or two elements across the wall'
+            f"warning: the mesh is coarse for mode{'' if one else 's'} {names}: bars of up to {self.bar_cents[coarse].max():.0f} cents,"
+            ' changes may be off by 10 % and more; compute the bank again with "accuracy_cents": 5, or two elements across the wall'
         ]
 
     def check_cut(self, depth, cut_m):

@@ -29,7 +29,7 @@ T60_DECAY = math.log(1000.0)
 ROOM_T60_S, ROOM_LEVELS = (0.15, 0.25, 0.4, 0.6, 0.9, 1.4), tuple(10 ** (db / 10) for db in (-28, -24, -20, -16, -12, -8, -4))
 ROOM_STEP_S = 0.008  # of a line's amplitudes
 ROOM_BAND_HZ, ROOM_MINOR = 70.0, 0.5  # lines so near, weaker by this factor, are the flicker of a line
-ROOM_SHARE = 0.2  # standard error of a decay in a room, of the decay
+ROOM_SHARE, QUIET_SHARE = 0.2, 0.02  # least standard error of a decay, of the decay: in a room; else: a room too weak to be noticed
 MAX_WAV_S = 600.0
 
 
@@ -361,8 +361,9 @@ def hear(samples, rate):
         if decay[k] < 2 * sd_decay or (decay[k] < 0.3 and is_hum(hz[k])):
             steady.append(hz[k])
             continue
+        sd_decay = math.hypot(sd_decay, (ROOM_SHARE if room_t60_s else QUIET_SHARE) * decay[k])
         if room_t60_s:
-            sd_angle, sd_decay = math.hypot(sd_angle, ROOM_SHARE * decay[k]), math.hypot(sd_decay, ROOM_SHARE * decay[k])
+            sd_angle = math.hypot(sd_angle, ROOM_SHARE * decay[k])
         undamped = math.hypot(hz[k], decay[k] / (2 * math.pi))
         level = 20 * math.log10(size[k] / size.max())
         peaks.append(Peak(undamped, sd_angle / (2 * math.pi), max(decay[k], 1e-3), sd_decay, level))

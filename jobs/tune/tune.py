@@ -60,7 +60,7 @@ def add_command(commands):
     add(
         "--cuts",
         metavar="CUTS.json",
-        help="no wishes: removes the spots that the page of carillon explore has written, and solves again; in place of the job also its bank",
+        help="no wishes: removes the spots that the page of carillon explore has written, and solves again; also of a bank",
     )
     add(
         "--remove",
