@@ -21,6 +21,7 @@
 #include "runtime/base/version.hpp"
 #include "runtime/render/sound/sound_store.hpp"
 #include "runtime/render/sound/spectrogram.hpp"
+#include "runtime/render/sound/wav_header.hpp"
 
 namespace carillon::simulation {
 namespace {
@@ -38,28 +39,8 @@ void put(std::string& bytes, T value) {
 /// channels: (receivers)(frames) [Pa]. 32-bit floats in pascals times `gain_per_pa`. Throws SystemError for write errors.
 void write_sound(const std::filesystem::path& file, const std::vector<std::vector<double>>& channels, int rate_hz, double gain_per_pa) {
   const std::size_t frames = channels.empty() ? 0 : channels[0].size();
-  const std::uint64_t data = std::uint64_t{frames} * channels.size() * sizeof(float);
-  if (data > 0xfffff000ULL)
-    throw InputError(fmt::format("{}: {} channels of {} samples are more than a WAV file can hold; simulate less at once", file.string(),
-                                 channels.size(), frames));
-  std::string header = "RIFF";
-  put(header, static_cast<std::uint32_t>(36 + 14 + data));
-  header += "WAVEfmt ";
-  put(header, std::uint32_t{18});
-  put(header, std::uint16_t{3});  // IEEE float
-  put(header, static_cast<std::uint16_t>(channels.size()));
-  put(header, static_cast<std::uint32_t>(rate_hz));
-  put(header, static_cast<std::uint32_t>(static_cast<std::size_t>(rate_hz) * channels.size() * sizeof(float)));
-  put(header, static_cast<std::uint16_t>(channels.size() * sizeof(float)));
-  put(header, std::uint16_t{32});
-  put(header, std::uint16_t{0});
-  header += "fact";
-  put(header, std::uint32_t{4});
-  put(header, static_cast<std::uint32_t>(frames));
-  header += "data";
-  put(header, static_cast<std::uint32_t>(data));
   base::WholeFile whole(file);
-  whole.append(header);
+  whole.append(sound::make_wav_header(rate_hz, channels.size(), {.bits = 32, .is_float = true}, frames));
   std::string piece;
   for (std::size_t i = 0; i < frames; ++i) {
     for (const std::vector<double>& channel : channels) put(piece, static_cast<float>(gain_per_pa * channel[i]));

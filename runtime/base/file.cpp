@@ -155,6 +155,13 @@ void WholeFile::append(std::string_view bytes) {
   if (const int error = write_all(descriptor_, bytes); error != 0) refuse(error);
 }
 
+void WholeFile::overwrite(std::uint64_t at, std::string_view bytes) {
+  const off_t end = ::lseek(descriptor_, 0, SEEK_CUR);
+  if (end < 0 || ::lseek(descriptor_, static_cast<off_t>(at), SEEK_SET) < 0) refuse(errno);
+  append(bytes);
+  if (::lseek(descriptor_, end, SEEK_SET) < 0) refuse(errno);
+}
+
 void WholeFile::commit() {
   if (::fsync(descriptor_) != 0) refuse(errno);
   {

@@ -46,6 +46,8 @@ class WholeFile {
   WholeFile& operator=(const WholeFile&) = delete;
 
   void append(std::string_view bytes);
+  /// Replaces bytes that were appended; they must exist.
+  void overwrite(std::uint64_t at, std::string_view bytes);
   /// On return the name refers to the new content.
   void commit();
 

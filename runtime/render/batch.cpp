@@ -37,7 +37,7 @@ const base::Keys<ProgramOptions> kRun{{"scene", "required", "scene file; paths a
 ProgramOptions read_run(base::Object& object) {
   ProgramOptions options;
   options.scene = object.path("scene");
-  options.wav = object.path("output");
+  options.sound = object.path("output");
   const auto read = [&](const char* key, std::optional<std::filesystem::path>& to) {
     if (object.has(key)) to = object.path(key);
   };
@@ -73,7 +73,7 @@ std::vector<ProgramOptions> read_manifest(const std::filesystem::path& file) {
   if (root.objects("scenes").empty()) root.fail("scenes", "is missing or empty; list objects with \"scene\" and \"output\"");
   for (base::Object& object : root.objects("scenes")) {
     const ProgramOptions run = runs.emplace_back(read_run(object));
-    for (const auto& output : {std::optional(run.wav), run.labels, run.record, run.report, run.trajectory, run.spectrogram})
+    for (const auto& output : {std::optional(run.sound), run.labels, run.record, run.report, run.trajectory, run.spectrogram})
       if (output && !written.emplace(output->lexically_normal(), object.find_place("")).second)
         throw InputError(
             fmt::format("{}: {} is written twice; give every file a name of its own", object.find_place("output"), output->string()));

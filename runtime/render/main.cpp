@@ -1,4 +1,4 @@
-// carillon-render: a scene file to a WAV file.
+// carillon-render: a scene file to a sound file.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -66,8 +66,9 @@ int main(int argc, char** argv) {
   int jobs = 0;
   app.add_option("scene", options.scene, "Scene file (JSON); with --jobs a manifest of scenes")->required()->option_text("SCENE.json");
   auto* output =
-      app.add_option("-o,--output", options.wav,
-                     "WAV file to write: stereo, or a channel for each microphone; - is standard output; required without --plan")
+      app.add_option("-o,--output", options.sound,
+                     "Sound to write: .wav, .flac, .opus or .ogg; a channel for each ear or microphone; - is WAV to standard output; "
+                     "required without --plan")
           ->option_text("OUT.wav");
   app.add_option("--spectrogram", options.spectrogram, "Picture of the sound: level over time and frequency")->option_text("OUT.png");
   app.add_option("--trajectory", options.trajectory, "Paths of the bodies and their contacts")->option_text("OUT.json");

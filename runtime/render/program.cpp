@@ -79,7 +79,7 @@ void check_room(const scene::Scene& scene, const fs::path& wav) {
   const fs::space_info space = fs::space(folder, error);
   if (error || kept <= static_cast<double>(base::Spool::kMemory) || static_cast<double>(space.available) >= kept + whole) return;
   throw SystemError(
-      fmt::format("{}: {:.3g} GB are free, and the sound needs {:.3g} GB: {:.3g} GB for the WAV file and {:.3g} GB while it is "
+      fmt::format("{}: {:.3g} GB are free, and the sound needs {:.3g} GB: {:.3g} GB for its file and {:.3g} GB while it is "
                   "made; make room or choose another place",
                   folder.string(), 1e-9 * static_cast<double>(space.available), 1e-9 * (kept + whole), 1e-9 * whole, 1e-9 * kept));
 }
@@ -108,8 +108,8 @@ class Outputs {
   std::vector<OutputFile> files_;
 };
 
-/// "NAME.sensors.wav" next to the WAV file.
-fs::path find_sensor_file(const fs::path& wav) { return fs::path(wav).replace_extension(".sensors.wav"); }
+/// "NAME.sensors.wav" next to the file of the sound.
+fs::path find_sensor_file(const fs::path& sound) { return fs::path(sound).replace_extension(".sensors.wav"); }
 
 bool is_npz(const fs::path& labels) { return base::find_extension(labels) == ".npz"; }
 
@@ -119,26 +119,19 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
   return fs::weakly_canonical(fs::absolute(a), error) == fs::weakly_canonical(fs::absolute(b), error);
 }
 
-/// Only WAV is written; other extensions are refused.
-void check_sound_name(const fs::path& file) {
-  const std::string extension = base::find_extension(file);
-  if (file == "-" || extension == ".wav" || extension == ".wave") return;
-  throw InputError(fmt::format("{}: the sound is written as WAV; give the output a name that ends in .wav", file.string()));
-}
-
 /// Checks that every output is writable, differs from all inputs, and is named once.
 void check_outputs(const ProgramOptions& options, const scene::Scene& scene) {
   std::vector<std::pair<fs::path, std::string>> outputs;
-  if (!options.plan && !is_standard_output(options.wav)) outputs.emplace_back(options.wav, "WAV file");
+  if (!options.plan && !is_standard_output(options.sound)) outputs.emplace_back(options.sound, "sound file");
   if (options.spectrogram) outputs.emplace_back(*options.spectrogram, "spectrogram");
   if (options.trajectory) outputs.emplace_back(*options.trajectory, "trajectory");
   if (options.report) outputs.emplace_back(*options.report, "report");
   if (options.record) outputs.emplace_back(*options.record, "contacts file");
   if (options.labels) outputs.emplace_back(*options.labels, "file of labels");
   const bool has_sensors = !options.plan && !scene.sensors.empty();
-  if (has_sensors && is_standard_output(options.wav))
-    throw InputError(fmt::format("{}: the scene has sensors, whose file is named after the WAV file; give -o a name", scene.file.string()));
-  if (has_sensors) outputs.emplace_back(find_sensor_file(options.wav), "file of the sensors");
+  if (has_sensors && is_standard_output(options.sound))
+    throw InputError(fmt::format("{}: the scene has sensors, whose file is named after the sound; give -o a name", scene.file.string()));
+  if (has_sensors) outputs.emplace_back(find_sensor_file(options.sound), "file of the sensors");
   std::vector<std::pair<fs::path, std::string>> taken{{scene.file, "scene"}};
   if (options.contacts) taken.emplace_back(*options.contacts, "contacts file to play");
   for (const scene::SceneBody& body : scene.bodies)
@@ -154,7 +147,8 @@ void check_outputs(const ProgramOptions& options, const scene::Scene& scene) {
     base::check_writable(file, what);
     taken.emplace_back(file, what);
   }
-  if (!options.plan) check_sound_name(options.wav);
+  if (!options.plan)
+    find_codec(options.sound, scene.sample_rate_hz, scene::count_channels(scene), scene.output.format, options.format.has_value());
   if (options.labels && !is_npz(*options.labels) && base::find_extension(*options.labels) != ".jsonl")
     throw InputError(fmt::format("{}: labels are written as .npz or .jsonl; give the file a name that ends so", options.labels->string()));
 }
@@ -270,7 +264,7 @@ scene::Scene prepare_scene(const ProgramOptions& options) {
     scene.output.format = static_cast<scene::SampleFormat>(name - scene::kSampleFormatNames.begin());
   }
   if (options.plan &&
-      (options.spectrogram || options.trajectory || options.report || options.record || options.labels || !options.wav.empty())) {
+      (options.spectrogram || options.trajectory || options.report || options.record || options.labels || !options.sound.empty())) {
     throw InputError("--plan makes no sound and writes no files; remove the options that name files");
   }
   return scene;
@@ -290,9 +284,9 @@ void print_plan(const scene::Scene& scene, const scene::Plan& plan) {
 class Run {
  public:
   explicit Run(const ProgramOptions& options) : options_(&options), scene_(prepare_scene(options)) {
-    if (is_standard_output(options.wav)) base::check_standard_output("sound");
+    if (is_standard_output(options.sound)) base::check_standard_output("sound");
     check_outputs(options, scene_);
-    if (!options.plan) check_room(scene_, options.wav);
+    if (!options.plan) check_room(scene_, options.sound);
     read_surfaces(scene_);
     banks_ = scene::read_banks(scene_, options.quiet);
     head_ = scene::make_head(scene_, scene_.sample_rate_hz);  // before the physics, to report its errors early
@@ -360,10 +354,10 @@ class Run {
   const scene::Scene& get_scene() const { return scene_; }
 
  private:
-  base::Spool make_spool(const char* what) const { return base::Spool(find_spool_folder(options_->wav), what); }
+  base::Spool make_spool(const char* what) const { return base::Spool(find_spool_folder(options_->sound), what); }
 
   void write(const scene::Plan& plan, const Sound& sound, const sound::SoundStore& store, const sound::SoundStore& sensors) {
-    const bool to_standard_output = is_standard_output(options_->wav);
+    const bool to_standard_output = is_standard_output(options_->sound);
     std::FILE* notes = to_standard_output ? stderr : stdout;
     Outputs outputs;
     const auto append_to = [](base::WholeFile& file) { return [&file](std::string_view bytes) { file.append(bytes); }; };
@@ -383,9 +377,14 @@ class Run {
     }
     if (options_->record) scene::write_recording(happened_, append_to(outputs.add(*options_->record, "contacts file")));
     const auto write_sound = [&](auto&& sink) { write_wav(store, figures_.gain.per_pa, scene_.output.format, sink); };
+    const SoundCodec codec =
+        find_codec(options_->sound, scene_.sample_rate_hz, store.get_channels(), scene_.output.format, options_->format.has_value());
     if (!scene_.sensors.empty())
-      write_wav(sensors, 1.0, scene::SampleFormat::kFloat, append_to(outputs.add(find_sensor_file(options_->wav), "sensors")));
-    if (!to_standard_output) write_sound(append_to(outputs.add(options_->wav, "sound")));
+      write_wav(sensors, 1.0, scene::SampleFormat::kFloat, append_to(outputs.add(find_sensor_file(options_->sound), "sensors")));
+    if (codec != SoundCodec::kWav)
+      write_coded(store, figures_.gain.per_pa, scene_.output.format, codec, outputs.add(options_->sound, "sound"));
+    else if (!to_standard_output)
+      write_sound(append_to(outputs.add(options_->sound, "sound")));
     if (!options_->quiet) print_summary(notes, scene_, sound, figures_);
     print_warnings(scene_, sound, figures_);
     if (to_standard_output) {

@@ -9,7 +9,7 @@ namespace carillon::render {
 
 struct ProgramOptions {
   std::filesystem::path scene;
-  std::filesystem::path wav;  // "-" is standard output
+  std::filesystem::path sound;  // codec by its extension; "-": WAV to standard output
   std::optional<std::filesystem::path> spectrogram, trajectory, report;
   std::optional<std::filesystem::path> contacts;  // replaces the scene's physics and strikes
   std::optional<std::filesystem::path> record;

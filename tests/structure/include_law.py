@@ -250,7 +250,7 @@ PUBLIC = {
     "runtime/exchange": ["gltf/"],
     "runtime/physics": ["geometry/shape.hpp", "impact/", "joints/mechanism.hpp", "rigid/limits.hpp"],
     "runtime/scene": ["effects/effect_selector.hpp", "effects/table.hpp"],
-    "runtime/render": ["sound/sound_store.hpp", "sound/spectrogram.hpp"],
+    "runtime/render": ["sound/sound_store.hpp", "sound/spectrogram.hpp", "sound/wav_header.hpp"],
     "precompute/job": ["cost/"],
     "precompute/mesh": ["shapes/shapes.hpp", "distributed/", "parallel/read_parallel.hpp"],
     "precompute/fem": ["error_bars/correct.hpp", "error_bars/error_bars.hpp"],
