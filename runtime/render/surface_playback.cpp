@@ -19,6 +19,7 @@
 #include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/quaternion.hpp"
+#include "runtime/synth/ambisonics.hpp"
 #include "runtime/synth/head_ears.hpp"
 #include "runtime/synth/trajectory.hpp"
 
@@ -41,7 +42,8 @@ bool is_reflected(const scene::Scene& scene) {
 }
 
 bool is_heard_by_head(const scene::Scene& scene) {
-  return scene::has_head(scene) && scene.effects.has(synth::Effect::kHead) && scene.effects.has(synth::Effect::kTwoEars);
+  return scene::has_ambisonics(scene) ||
+         (scene::has_head(scene) && scene.effects.has(synth::Effect::kHead) && scene.effects.has(synth::Effect::kTwoEars));
 }
 
 /// Scene time [s].
@@ -94,7 +96,8 @@ std::string describe_surface(const scene::Scene& scene, const scene::SceneSurfac
   std::string text = fmt::format("recorded surface, {} triangles of {} {}, {:.4g} s from {:g} s on{}", header.triangles, header.bodies,
                                  header.bodies == 1 ? "body" : "bodies", surface.recording->get_duration_s(), surface.start_s,
                                  surface.loop ? ", looped" : "");
-  text += plan.has_head                  ? "; heard through the listener's head"
+  text += scene::has_ambisonics(scene)   ? fmt::format("; in Ambisonics of order {}", scene.listener.order)
+          : plan.has_head                ? "; heard through the listener's head"
           : !scene.microphones_m.empty() ? fmt::format("; at {} {}", channels, channels == 1 ? "microphone" : "microphones")
                                          : "; heard at two free ears";
   text += plan.is_reflected ? fmt::format("; with ground reflection, {:g} of the pressure", *scene.reflection) : "";
@@ -135,11 +138,16 @@ class SurfacePlayback::Voice {
     if (head_) offsets_m_ = {synth::calc_middle(offsets_m_)};
     const std::size_t ways = floor_ ? 2 : 1;
     blockers_.resize(ways * offsets_m_.size());
-    for (std::size_t way = 0; head_ && way < ways; ++way) ears_.emplace_back(head_->head);
+    for (std::size_t way = 0; head_ && way < ways; ++way) {
+      if (head_->ambisonic_order > 0)
+        encoders_.emplace_back(head_->ambisonic_order);
+      else
+        ears_.emplace_back(head_->head);
+    }
   }
 
   /// Latency of the head: samples not heard at the beginning.
-  std::size_t get_latency() const { return head_ ? static_cast<std::size_t>(head_->head->get_latency()) : 0; }
+  std::size_t get_latency() const { return head_ ? static_cast<std::size_t>(head_->get_latency()) : 0; }
 
   /// Adds the next kPiece samples to out (channels, kPiece), delayed by the head's latency.
   void add(std::vector<std::vector<double>>& out) {
@@ -232,7 +240,7 @@ class SurfacePlayback::Voice {
     for (std::size_t n = 0; n < kPiece; n += kTurn) {
       const double time_s = static_cast<double>(at_ + n + kTurn) / rate_hz_;
       const Vec3 listener = microphones_->centre.find(time_s).position_m + offsets_m_[0];
-      for (std::size_t way = 0; way < ears_.size(); ++way) {
+      for (std::size_t way = 0; way < ears_.size() + encoders_.size(); ++way) {
         // Centre of the bodies at the retarded time; one iteration suffices.
         double age_s = 0.0;
         Vec3 to{};
@@ -242,8 +250,12 @@ class SurfacePlayback::Voice {
           to = middle - listener;
           age_s = norm(to) / header.sound_speed_m_s;
         }
-        ears_[way].process(synth::turn(find_inverse(head_->rotation), to), get_heard(way).subspan(n, kTurn),
-                           std::span(out[0]).subspan(n, kTurn), std::span(out[1]).subspan(n, kTurn));
+        const Vec3 in_head = synth::turn(find_inverse(head_->rotation), to);
+        if (!encoders_.empty())
+          encoders_[way].process(in_head, get_heard(way).subspan(n, kTurn), out, n);
+        else
+          ears_[way].process(in_head, get_heard(way).subspan(n, kTurn), std::span(out[0]).subspan(n, kTurn),
+                             std::span(out[1]).subspan(n, kTurn));
       }
     }
   }
@@ -265,10 +277,11 @@ class SurfacePlayback::Voice {
   std::uint64_t start_;
   double alpha_;
   std::optional<synth::ListeningHead> head_;
-  std::optional<synth::Floor> floor_;          // if the ground reflects
-  std::vector<Vec3> offsets_m_;                // of ears or microphones; of the head's centre
-  std::vector<recording::HighPass> blockers_;  // per receiver: offsets_m_, then their images
-  std::vector<synth::HeadEars> ears_;          // of a head: direct, then reflected
+  std::optional<synth::Floor> floor_;              // if the ground reflects
+  std::vector<Vec3> offsets_m_;                    // of ears or microphones; of the head's centre
+  std::vector<recording::HighPass> blockers_;      // per receiver: offsets_m_, then their images
+  std::vector<synth::HeadEars> ears_;              // of a head: direct, then reflected
+  std::vector<synth::AmbisonicEncoder> encoders_;  // in place of ears_
   std::list<Round> rounds_;
   std::uint64_t count_ = 0, at_ = 0;                // passes started; samples made
   std::vector<double> heard_, played_, resampled_;  // heard_ (receivers, kPiece)

@@ -13,6 +13,10 @@ Microphones make_microphones(const Scene& scene) {
   std::vector<synth::PathPoint> path = listener.path;
   if (path.empty()) path.push_back({0.0, listener.position_m});
   Microphones microphones{synth::make_trajectory(path), {}};
+  if (has_ambisonics(scene)) {
+    microphones.offset_m.resize(count_channels(scene));
+    return microphones;
+  }
   for (Vec3 ear : calc_ears(listener)) {
     for (int k = 0; k < 3; ++k) ear[k] = scene.effects.has(synth::Effect::kTwoEars) ? ear[k] - listener.position_m[k] : 0.0;
     microphones.offset_m.push_back(ear);
@@ -24,6 +28,9 @@ std::optional<synth::ListeningHead> make_head(const Scene& scene, double rate_hz
   if (!has_head(scene)) return std::nullopt;
   const SceneListener& listener = scene.listener;
   const std::array<Vec3, 2> ears = calc_ears(listener);
+  if (has_ambisonics(scene))
+    return synth::ListeningHead{.rotation = synth::calc_head_rotation(listener.facing, ears[0] - ears[1]),
+                                .ambisonic_order = listener.order};
   return synth::ListeningHead{.head = listener.sofa.empty() ? head::make_sphere(rate_hz, {.radius_m = 0.5 * listener.ear_distance_m})
                                                             : head::read_sofa(listener.sofa, rate_hz),
                               .rotation = synth::calc_head_rotation(listener.facing, ears[0] - ears[1])};

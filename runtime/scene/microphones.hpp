@@ -19,8 +19,8 @@ struct Microphones {
 
 Microphones make_microphones(const Scene& scene);
 
-/// The head between the listener's ears; empty for free ears. Throws InputError "FILE: ..." for an invalid head file (head::read_sofa).
-/// Takes some milliseconds.
+/// The head between the listener's ears, or Ambisonics; empty for free ears. Throws InputError "FILE: ..." for an invalid head file
+/// (head::read_sofa). Takes some milliseconds.
 std::optional<synth::ListeningHead> make_head(const Scene& scene, double rate_hz);
 
 /// Path of the centre from time 0 on, as events in order of time; empty if it does not move.

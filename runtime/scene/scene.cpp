@@ -159,7 +159,9 @@ const base::Keys<SceneListener> kListener{
     {"path", "none", "replaces `position_m`: rows `[t, x, y, z]` in order of time; smooth between, at rest before and after"},
     {"look_at_m", "none", "point to look at"},
     {"facing", "`[0, 1, 0]`", "replaces `look_at_m`: direction"},
-    {"ears", &SceneListener::ears, kEarsNames, "two points, or a head between them ([Heads](#heads))"},
+    {"ears", &SceneListener::ears, kEarsNames,
+     "two points, a head between them ([Heads](#heads)), or [Ambisonics](sound-files.md#ambisonics)"},
+    {"order", &SceneListener::order, Limits{1, synth::kMaxAmbisonicOrder}, "of Ambisonics: 4, 9 or 16 channels"},
     {"sofa", "none", "with `\"hrtf\"`: SOFA file of a measured head; without it the head is a rigid sphere"},
     {"ear_distance_m", "0.2", "0 to 10; with `\"hrtf\"` the width of the sphere, 0.175 by default, 0.06 to 0.6"}};
 const base::Keys<Output> kOutput{
@@ -237,8 +239,15 @@ std::vector<synth::PathPoint> read_path(base::Object& object, std::string_view k
   return path;
 }
 
-/// Ears of a listener: free, on a sphere or on a measured head.
+/// Ears of a listener: free, on a sphere, on a measured head, or Ambisonics.
 void parse_ears(base::Object& object, SceneListener& listener) {
+  if (listener.ears != Ears::kAmbisonic && object.has("order"))
+    object.fail("order", "needs \"ears\": \"ambisonic\"; add that, or leave it out");
+  if (listener.ears == Ears::kAmbisonic) {
+    for (const char* key : {"sofa", "ear_distance_m"})
+      if (object.has(key)) object.fail(key, "Ambisonics have no head; leave it out");
+    return;
+  }
   if (listener.ears == Ears::kFree) {
     if (object.has("sofa")) object.fail("sofa", "needs \"ears\": \"hrtf\"; add that, or leave it out");
     listener.ear_distance_m = read_within(object, "ear_distance_m", listener.ear_distance_m, 0.0, 10.0);
@@ -385,9 +394,14 @@ std::vector<base::KeyTable> describe_scene_keys() {
   return tables;
 }
 
-bool has_head(const Scene& scene) { return scene.microphones_m.empty() && scene.listener.ears == Ears::kHrtf; }
+bool has_head(const Scene& scene) { return scene.microphones_m.empty() && scene.listener.ears != Ears::kFree; }
 
-std::size_t count_channels(const Scene& scene) { return scene.microphones_m.empty() ? 2 : scene.microphones_m.size(); }
+bool has_ambisonics(const Scene& scene) { return scene.microphones_m.empty() && scene.listener.ears == Ears::kAmbisonic; }
+
+std::size_t count_channels(const Scene& scene) {
+  if (has_ambisonics(scene)) return synth::count_ambisonic_channels(scene.listener.order);
+  return scene.microphones_m.empty() ? 2 : scene.microphones_m.size();
+}
 
 std::array<Vec3, 2> calc_ears(const SceneListener& listener) {
   // Left is up x facing, or -x for a listener looking straight up or down.

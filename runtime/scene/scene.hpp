@@ -19,6 +19,7 @@
 #include "runtime/material/mallets.hpp"
 #include "runtime/physics/world.hpp"
 #include "runtime/scene/effects/effect_selector.hpp"
+#include "runtime/synth/ambisonics.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/floor.hpp"
 #include "runtime/synth/kernels.hpp"
@@ -39,8 +40,8 @@ inline const std::vector<std::string> kSampleFormatNames{"pcm16", "pcm24", "pcm3
 inline const std::vector<std::string> kFrequenciesNames{"corrected", "mesh"};
 
 /// Names of the key "ears" of a listener, in the order of Ears.
-enum class Ears { kFree, kHrtf };
-inline const std::vector<std::string> kEarsNames{"free", "hrtf"};
+enum class Ears { kFree, kHrtf, kAmbisonic };
+inline const std::vector<std::string> kEarsNames{"free", "hrtf", "ambisonic"};
 
 /// Names of the key "kind" of a joint, in the order of joints::Kind.
 inline const std::vector<std::string> kJointNames{"weld", "hinge", "slider", "universal", "ball"};
@@ -134,6 +135,7 @@ struct SceneListener {
   Vec3 facing{0.0, 1.0, 0.0};          // unit vector
   double ear_distance_m = 0.2;         // OCE01; with a head: its width
   Ears ears = Ears::kFree;
+  int order = 1;               // of Ambisonics
   std::filesystem::path sofa;  // absolute, file of a measured head; empty: rigid sphere
 };
 
@@ -202,10 +204,11 @@ synth::SensorSettings locate_sensor(const Scene& scene, const SceneSensor& senso
 /// Reflecting ground; empty if it does not reflect.
 std::optional<synth::Floor> find_floor(const Scene& scene);
 
-/// True if the listener has a head.
+/// True if the listener has a head, or hears Ambisonics: the sound depends on the direction from which it comes.
 bool has_head(const Scene& scene);
+bool has_ambisonics(const Scene& scene);
 
-/// Channels of the sound: microphones, or two ears.
+/// Channels of the sound: microphones, two ears, or those of Ambisonics.
 std::size_t count_channels(const Scene& scene);
 
 /// Initial positions of the left and right ear, on a horizontal line unless the listener looks straight up or down.

@@ -86,6 +86,7 @@ synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::Effec
   if (!has_head(scene)) effects = effects.without(synth::Effect::kHead);
   if (scene.bodies[body].spec.fixed) effects = effects.without(synth::Effect::kAccelerationNoise);
   if (!scene.microphones_m.empty()) effects = effects.with(synth::Effect::kTwoEars);
+  if (has_ambisonics(scene)) effects = effects.with({synth::Effect::kTwoEars, synth::Effect::kHead});
   return effects;
 }
 

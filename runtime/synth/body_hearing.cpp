@@ -51,7 +51,7 @@ void SoundingBody::count_ear(std::size_t microphone, bool is_mirrored, int moved
 
 void SoundingBody::hear(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch, Mix& mix) noexcept {
   Propagation& propagation = *propagation_;
-  if (!propagation.head.empty()) return hear_by_head(sample, count, listener, scratch, mix);
+  if (has_head(effects_)) return hear_by_head(sample, count, listener, scratch, mix);
   for (std::size_t m = 0; m < propagation.ears.size() && (propagation.monopole || propagation.dipole[0]); ++m) {
     for (const bool is_mirrored : {false, true}) {
       if (is_mirrored && propagation.mirrored.empty()) continue;
@@ -85,7 +85,7 @@ void SoundingBody::hear_by_head(std::int64_t sample, std::size_t count, const Li
                                 Mix& mix) noexcept {
   Propagation& propagation = *propagation_;
   const bool has_whole = propagation.monopole || propagation.dipole[0];
-  for (std::size_t way = 0; way < propagation.head.size(); ++way) {
+  for (std::size_t way = 0; way < propagation.head.size() + propagation.ambisonics.size(); ++way) {
     const bool is_mirrored = way > 0;
     const double level = is_mirrored ? listener.get_floor()->reflection : 1.0;
     const std::span<double> arrived = std::span(scratch.heard).first(count);
@@ -121,15 +121,18 @@ void SoundingBody::hear_by_head(std::int64_t sample, std::size_t count, const Li
     if (level != 1.0)
       for (double& p : arrived) p *= level;
 
-    const std::array<std::span<double>, 2> ears{std::span(mix[0]).first(count), std::span(mix[1]).first(count)};
     for (std::size_t n = 0; n < count; n += kSubBlock) {
       const std::size_t size = std::min<std::size_t>(kSubBlock, count - n);
       Vec3 from = -1.0 * direction[n / kSubBlock];
       if (is_mirrored) from = listener.get_floor()->mirror_direction(from);
       const double end_s =
           static_cast<double>(sample + static_cast<std::int64_t>(n + size) - Receiver::kLatency) / frame_.propagation.rate_hz;
-      propagation.head[way].process(listener.find_in_head(from, end_s), arrived.subspan(n, size), ears[0].subspan(n, size),
-                                    ears[1].subspan(n, size));
+      const Vec3 in_head = listener.find_in_head(from, end_s);
+      if (!propagation.ambisonics.empty())
+        propagation.ambisonics[way].process(in_head, arrived.subspan(n, size), mix, n);
+      else
+        propagation.head[way].process(in_head, arrived.subspan(n, size), std::span(mix[0]).subspan(n, size),
+                                      std::span(mix[1]).subspan(n, size));
     }
     work_.units[Effect::kHead] += static_cast<std::int64_t>(count);
   }

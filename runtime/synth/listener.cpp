@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "runtime/acoustics/head/head.hpp"
 #include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
 
@@ -17,6 +18,8 @@ constexpr events::Quaternion kNotTurned{1.0, 0.0, 0.0, 0.0};
 Vec3 turn_back(const events::Quaternion& rotation, const Vec3& x) noexcept { return turn(find_inverse(rotation), x); }
 
 }  // namespace
+
+int ListeningHead::get_latency() const noexcept { return head ? head->get_latency() : 0; }
 
 events::Quaternion calc_head_rotation(const Vec3& forward, const Vec3& left) noexcept {
   const double length = norm(forward);

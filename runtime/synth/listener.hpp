@@ -16,10 +16,15 @@ class Head;
 
 namespace carillon::synth {
 
-/// Head that replaces two microphones, left and right, in their middle.
+/// Head that replaces two microphones, left and right, in their middle; or, with an order, the point that Ambisonics replace
+/// count_ambisonic_channels() microphones by.
 struct ListeningHead {
   std::shared_ptr<const head::Head> head;
   events::Quaternion rotation{1.0, 0.0, 0.0, 0.0};  // of its frame (x forward, y left, z up) for an unrotated listener
+  int ambisonic_order = 0;                          // above 0: Ambisonics, and no head
+
+  /// Delay of the sound at the ears [samples].
+  int get_latency() const noexcept;
 };
 
 /// Rotation of a head with this forward direction and left ear; any lengths, only the part of `left` across `forward` counts. Identity if

@@ -29,7 +29,7 @@ std::size_t count_straight(EffectSet effects, const PropagationOptions& options)
 
 /// Additional latency [samples] of receivers without a head, equal to that of the head.
 int calc_more_latency(EffectSet effects, const PropagationOptions& options) {
-  return options.head && !has_head(effects) ? options.head->head->get_latency() : 0;
+  return options.head && !has_head(effects) ? options.head->get_latency() : 0;
 }
 
 /// Length of a delay line.
@@ -147,7 +147,12 @@ std::unique_ptr<Propagation> make_propagation(EffectSet effects, const Propagati
   for (std::size_t e = 0; e < offsets.size(); ++e)
     (e < straight ? propagation->ears : propagation->mirrored)
         .emplace_back(offsets[e], options.rate_hz, effects, Isa::kBest, 0.0, calc_more_latency(effects, options));
-  for (std::size_t e = 0; e < offsets.size() && has_head(effects); ++e) propagation->head.emplace_back(options.head->head);
+  for (std::size_t e = 0; e < offsets.size() && has_head(effects); ++e) {
+    if (options.head->ambisonic_order > 0)
+      propagation->ambisonics.emplace_back(options.head->ambisonic_order);
+    else
+      propagation->head.emplace_back(options.head->head);
+  }
   return propagation;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runtime/events/events.hpp"
+#include "runtime/synth/ambisonics.hpp"
 #include "runtime/synth/delay_line.hpp"
 #include "runtime/synth/directivity.hpp"
 #include "runtime/synth/effects.hpp"
@@ -69,7 +70,7 @@ class DirectedSound {
 
 /// Invariant: all delay lines hold the same samples. Without directivity the modes have one delay line, with it one per ear; acceleration
 /// noise has its three dipoles in both cases. Ground reflection adds a mirrored ear for each ear. A head has one ear in its middle, whose
-/// sound is filtered by the direction of arrival.
+/// sound is filtered, or encoded for Ambisonics, by the direction of arrival.
 struct Propagation {
   EffectSet effects;
   std::unique_ptr<DelayLine> monopole;               // modes without directivity
@@ -79,6 +80,7 @@ struct Propagation {
   std::vector<Receiver> ears;                        // one per microphone, or one for all without two ears
   std::vector<Receiver> mirrored;                    // ground reflection of monopole and dipole: one per ear
   std::vector<HeadEars> head;                        // of the straight sound, and of the reflected one
+  std::vector<AmbisonicEncoder> ambisonics;          // in place of `head`
   Source source;
 
   /// False also while a head still sounds.

@@ -40,7 +40,11 @@ SynthesiserOptions check(SynthesiserOptions options) {
     for (const Vec3& place : options.microphones_m)
       if (floor->calc_height_m(options.listener_m + place) < 0.0) refuse("microphones above its floor");
   }
-  if (options.head) {
+  if (options.head && options.head->ambisonic_order != 0) {
+    const int order = options.head->ambisonic_order;
+    if (order < 1 || order > kMaxAmbisonicOrder || options.microphones_m.size() != count_ambisonic_channels(order))
+      refuse("Ambisonics of order 1 to 3, and a microphone for each of their channels");
+  } else if (options.head) {
     if (options.microphones_m.size() != 2) refuse("two microphones, left and right, for a head");
     if (options.head->head == nullptr || options.head->head->get_sample_rate_hz() != options.rate_hz)
       refuse("a head that is made for its sample rate");
@@ -106,7 +110,7 @@ Synthesiser::Synthesiser(SynthesiserOptions options)
   sensed_.reserve(bodies);
   awake_.resize((bodies + 63) / 64);
   mix_.resize(options_.microphones_m.size());
-  if (options_.head) latency_ += options_.head->head->get_latency();
+  if (options_.head) latency_ += options_.head->get_latency();
 }
 
 Synthesiser::~Synthesiser() = default;

@@ -288,14 +288,15 @@ void remove_effects_of_all(base::Json& scene, const std::vector<std::string>& na
   for (base::Json& body : scene["bodies"]) remove_effects(body, names);
 }
 
-/// Removes the head of a listener (the sound engine has none). True if there was one.
+/// Removes the head or the Ambisonics of a listener (the sound engine has neither). True if there was one.
 bool take_head(base::Json& scene) {
   if (!scene.has("listener")) return false;
   base::Json& listener = scene["listener"];
   const base::Json& ears = std::as_const(listener)["ears"];
-  const bool has_head = ears.is_string() && ears.as_string() == "hrtf";
+  const bool has_head = ears.is_string() && ears.as_string() != "free";
   listener.erase("ears");
   listener.erase("sofa");
+  listener.erase("order");
   if (has_head) remove_effects_of_all(scene, {"head"});
   return has_head;
 }

@@ -77,7 +77,7 @@ std::string describe(const SelectionReason& r) {
     case Rule::kNoHead:
       return "the listener has no head";
     case Rule::kByHead:
-      return "the listener has a head";
+      return "the listener has a head or Ambisonics";
     case Rule::kNoEnergy:
       return "the bank has no nonlinear energy";
     case Rule::kNothingAbove:

@@ -199,6 +199,30 @@ TEST_F(Surfaces, HeadHearsItLikeAModalBody) {
   EXPECT_LT(std::abs(std::remainder(late - free, kTwoPi)), 1.2);  // phases of the head alone; its latency of 0.9 ms would be 11 rad
 }
 
+TEST_F(Surfaces, AmbisonicsEncodeItsDirection) {
+  const Ball ball = make_tone(900.0);
+  write("a.surface.hdf", ball);
+  const std::string body = R"({"name": "a", "recording": "a.surface.hdf", "position_m": [-0.3, 0.4, 1.2], "high_pass_hz": 0})";
+  const scene::Scene scene = read(body, R"("listener": {"position_m": [0, 0, 0], "facing": [0, 1, 0], "ears": "ambisonic", "order": 2})");
+  const auto sound = hear(scene), point = hear(read(body, R"("microphones": [[0, 0, 0]])"));
+  ASSERT_EQ(sound.size(), 9U);
+  EXPECT_EQ(sound[0], point[0]);
+  // 0.4 m ahead, 0.3 m to the left, 1.2 m up.
+  const double gains[] = {1.0,
+                          3.0 / 13.0,
+                          12.0 / 13.0,
+                          4.0 / 13.0,
+                          std::sqrt(3.0) * 12.0 / 169.0,
+                          std::sqrt(3.0) * 36.0 / 169.0,
+                          (3.0 * 144.0 / 169.0 - 1.0) / 2.0,
+                          std::sqrt(3.0) * 48.0 / 169.0,
+                          std::sqrt(3.0) / 2.0 * 7.0 / 169.0};
+  for (std::size_t c = 0; c < 9; ++c)
+    for (std::size_t n = 0; n < point[0].size(); ++n)
+      ASSERT_NEAR(sound[c][n], gains[c] * point[0][n], 1e-6 * std::abs(point[0][n]) + 1e-12) << c << " " << n;
+  EXPECT_NE(describe_surface(scene, scene.surfaces[0]).find("in Ambisonics of order 2"), std::string::npos);
+}
+
 TEST_F(Surfaces, InvalidInputIsOneError) {
   write("a.surface.hdf", make_tone(700.0), {.frames = 480});
   const std::string bytes = tests::read_all(folder / "a.surface.hdf");

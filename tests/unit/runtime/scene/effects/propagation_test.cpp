@@ -142,7 +142,7 @@ TEST(EffectSelector, AHeadIsOnForAllAudibleBodies) {
   stage.facts.microphones_m = {{1e-9, 0.0, 0.0}, {-1e-9, 0.0, 0.0}};  // ways that are the same
   const auto [heard, with] = play_strike(0.01);
   EXPECT_TRUE(heard.has(Effect::kHead) && heard.has(Effect::kTwoEars));
-  EXPECT_EQ(describe(with[Effect::kHead].reason), "the listener has a head");
+  EXPECT_EQ(describe(with[Effect::kHead].reason), "the listener has a head or Ambisonics");
   EXPECT_FALSE(play(stage.facts, {}).has(Effect::kHead)) << "silent body";
   stage.body().overrides.off = {Effect::kTwoEars};
   const auto [mono, deaf] = play_strike(0.01);
