@@ -1,11 +1,13 @@
 #include "runtime/exchange/commands.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/reduce.hpp"
@@ -16,6 +18,7 @@
 #include "runtime/base/standard_output.hpp"
 #include "runtime/exchange/faust.hpp"
 #include "runtime/exchange/glb.hpp"
+#include "runtime/exchange/sofa.hpp"
 #include "runtime/material/table.hpp"
 
 namespace carillon::exchange {
@@ -30,12 +33,13 @@ std::string find_format(const ExportWishes& wishes) {
   const std::string ending = base::find_extension(wishes.out);
   if (ending == ".glb") return "glb";
   if (ending == ".dsp") return "faust";
-  throw InputError(
-      fmt::format("{}: GLB files end in .glb, Faust programs in .dsp; rename the output, or give --format", wishes.out.string()));
+  if (ending == ".sofa") return "sofa";
+  throw InputError(fmt::format(
+      "{}: GLB files end in .glb, Faust programs in .dsp, SOFA files in .sofa; rename the output, or give --format", wishes.out.string()));
 }
 
 /// "0.01,0,0.05"
-Vec3 read_point(const std::string& word) {
+Vec3 read_point(const char* option, const std::string& word) {
   Vec3 point{};
   const char* at = word.data();
   const char* const end = at + word.size();
@@ -43,7 +47,8 @@ Vec3 read_point(const std::string& word) {
     const auto read = std::from_chars(at, end, point[c]);
     const bool is_last = c == 2;
     if (read.ec != std::errc() || !std::isfinite(point[c]) || (is_last ? read.ptr != end : read.ptr == end || *read.ptr != ','))
-      throw InputError(fmt::format("--points {}: give X,Y,Z in metres, or a number of points", word));
+      throw InputError(fmt::format("{} {}: give X,Y,Z in metres{}", option, word,
+                                   std::string_view(option) == "--points" ? ", or a number of points" : ""));
     at = read.ptr + 1;
   }
   return point;
@@ -59,7 +64,7 @@ void read_points(const std::vector<std::string>& words, FaustOptions& options) {
       return;
     }
   }
-  for (const std::string& word : words) options.points_m.push_back(read_point(word));
+  for (const std::string& word : words) options.points_m.push_back(read_point("--points", word));
 }
 
 /// Writes a file atomically, or standard output; then messages go to standard error.
@@ -81,18 +86,52 @@ void check_other(const fs::path& in, const fs::path& out) {
   if (fs::equivalent(in, out, error)) throw InputError(fmt::format("{}: this would overwrite the input; name another file", out.string()));
 }
 
+/// Throws InputError for options that are given and belong to other formats.
+void check_options(const ExportWishes& wishes, const std::string& format) {
+  const std::map<std::string, std::string> names{{"glb", "GLB"}, {"faust", "Faust"}, {"sofa", "SOFA"}};
+  const struct {
+    bool is_given;
+    const char* option;
+    std::vector<std::string> formats;
+  } options[] = {{wishes.modes.has_value(), "--modes", {"GLB", "Faust"}}, {!wishes.points.empty(), "--points", {"Faust"}},
+                 {wishes.radiation != "auto", "--radiation", {"Faust"}},  {wishes.is_z_up, "--up", {"GLB"}},
+                 {!wishes.strike.empty(), "--strike", {"SOFA"}},          {wishes.has_bands, "--bands", {"SOFA"}},
+                 {wishes.step_deg.has_value(), "--step", {"SOFA"}},       {wishes.distance_m.has_value(), "--distance", {"SOFA"}}};
+  const std::string& name = names.at(format);
+  for (const auto& one : options)
+    if (one.is_given && std::find(one.formats.begin(), one.formats.end(), name) == one.formats.end())
+      throw InputError(fmt::format("{} is for {}, and the output is {}; leave it out", one.option, fmt::join(one.formats, " and "), name));
+}
+
+void export_sofa(const bank::Bank& bank, const ExportWishes& wishes, const std::string& name, std::FILE* notes) {
+  SofaOptions options{.name = name, .has_bands = wishes.has_bands};
+  if (wishes.step_deg) options.step_deg = *wishes.step_deg;
+  if (wishes.distance_m) options.distance_m = *wishes.distance_m;
+  if (!wishes.strike.empty()) options.strike_m = read_point("--strike", wishes.strike);
+  SofaFile file;
+  try {
+    file = make_sofa(bank, options);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", wishes.bank.string(), error.what()));
+  }
+  write_output(wishes.out, "SOFA file", [&](const auto& sink) { sink(file.bytes); });
+  fmt::print(notes, "sofa      {} {} at {} receivers, {:g} m away, {:.3g} MB\n", file.frequencies,
+             wishes.has_bands ? "third octaves" : "modes", file.receivers, options.distance_m,
+             1e-6 * static_cast<double>(file.bytes.size()));
+}
+
 }  // namespace
 
 void run_export(const ExportWishes& wishes) {
   const std::string format = find_format(wishes);
   check_other(wishes.bank, wishes.out);
+  check_options(wishes, format);
   std::FILE* const notes = base::is_standard_output(wishes.out) ? stderr : stdout;
   const std::string name = wishes.name.empty() ? wishes.bank.stem().string() : wishes.name;
   bank::Bank bank = bank::read_bank(wishes.bank);
   if (bank.mode_count() == 0) throw InputError(fmt::format("{}: the bank has no modes, hence no sound", wishes.bank.string()));
+  if (format == "sofa") return export_sofa(bank, wishes, name, notes);
   if (format == "glb") {
-    for (const auto& [is_given, option] : {std::pair(!wishes.points.empty(), "--points"), {wishes.radiation != "auto", "--radiation"}})
-      if (is_given) throw InputError(fmt::format("{} is for Faust; a GLB file holds the whole surface and no gains", option));
     const std::size_t modes = bank.mode_count();
     if (wishes.modes) bank = bank::calc_reduced(bank, {.modes = wishes.modes});
     std::uint64_t bytes = 0;
@@ -106,7 +145,6 @@ void run_export(const ExportWishes& wishes) {
                1e-6 * static_cast<double>(bytes));
     return;
   }
-  if (wishes.is_z_up) throw InputError("--up is for GLB; a Faust program has no directions");
   FaustOptions options{.name = name};
   if (wishes.modes) options.modes = *wishes.modes;
   read_points(wishes.points, options);

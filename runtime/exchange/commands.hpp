@@ -10,12 +10,16 @@ namespace carillon::exchange {
 
 struct ExportWishes {
   std::filesystem::path bank, out;
-  std::string format;                // "glb", "faust"; empty: by the extension of `out`
+  std::string format;                // "glb", "faust", "sofa"; empty: by the extension of `out`
   std::optional<std::size_t> modes;  // default: all (glb), FaustOptions::modes (faust)
   std::vector<std::string> points;   // "X,Y,Z" in metres, or a single count
   std::string radiation = "auto";
   std::string name;  // empty: stem of the bank's file
   bool is_z_up = false;
+  // SOFA.
+  std::string strike;  // "X,Y,Z" in metres; empty: none
+  bool has_bands = false;
+  std::optional<double> step_deg, distance_m;
 };
 
 /// Writes the file and prints a summary to standard output (to standard error if the file goes there). Throws InputError.

@@ -206,8 +206,9 @@ void take_material(const bank::Bank& bank, Wishes& wishes) {
 
 void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
   app.add_option("BANK", wishes.bank, "Bank file")->required();
-  app.add_option("-o,--output", wishes.out, "Output file, .glb or .dsp; -: standard output")->required();
-  app.add_option("--format", wishes.format, "glb or faust; default: by the file name")->check(CLI::IsMember({"glb", "faust"}));
+  app.add_option("-o,--output", wishes.out, "Output file, .glb, .dsp or .sofa; -: standard output")->required();
+  app.add_option("--format", wishes.format, "glb, faust or sofa; default: by the file name")
+      ->check(CLI::IsMember({"glb", "faust", "sofa"}));
   app.add_option("--modes", wishes.modes, "Number of modes, the most audible ones; default: all (glb), 100 (faust)")->check(kCounts);
   app.add_option("--points", wishes.points, "Strike points (faust): X,Y,Z in metres each; or their number (4)")->option_text("X,Y,Z ...");
   app.add_option("--radiation", wishes.radiation, "Radiation model (faust), as \"radiation\" in a scene")
@@ -218,6 +219,11 @@ void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
          "--up", [&wishes](const std::string& axis) { wishes.is_z_up = axis == "z"; },
          "Axis of the body that is up in the other program (glb), y or z; default: y")
       ->check(CLI::IsMember({"y", "z"}));
+  app.add_option("--strike", wishes.strike, "Struck point (sofa), for a blow of 1 N s; default: unit modal velocities")
+      ->option_text("X,Y,Z");
+  app.add_flag("--bands", wishes.has_bands, "Third octaves of that blow (sofa) instead of modes");
+  app.add_option("--step", wishes.step_deg, "Degrees between receivers (sofa), a divisor of 180; default: 10");
+  app.add_option("--distance", wishes.distance_m, "Distance of the receivers (sofa) from the centre of the body [m]; default: 1");
 }
 
 void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
@@ -323,7 +329,9 @@ void add_commands(CLI::App& app, Options& options) {
   edit->add_option("OUT", options.edited, "Output bank; -: standard output")->required();
   add_options(*edit, options.wishes);
   add_export(
-      *app.add_subcommand("export", "Exports to GLB (mesh and modes, KHR_audio_rigid_bodies) or Faust (the loudest modes at a few points)"),
+      *app.add_subcommand(
+          "export",
+          "Exports to GLB (mesh and modes, KHR_audio_rigid_bodies), Faust (the loudest modes at a few points) or SOFA (directivity)"),
       options.exported);
   add_import(*app.add_subcommand("import", "Imports a GLB or glTF file with KHR_audio_rigid_bodies as a bank; lossless for exported files"),
              options.imported);

@@ -13,23 +13,20 @@
 
 #include "runtime/bank/blows.hpp"
 #include "runtime/bank/corrected.hpp"
-#include "runtime/bank/nearest.hpp"
 #include "runtime/bank/reduce.hpp"
-#include "runtime/bank/surface.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/sort_order.hpp"
-#include "runtime/base/vector.hpp"
 #include "runtime/base/version.hpp"
 #include "runtime/exchange/faust.hpp"
+#include "runtime/exchange/struck_point.hpp"
 
 namespace carillon::exchange {
 namespace {
 
-constexpr double kCritical = 5e-7;          // relative to omega: distance from critical damping
-constexpr std::size_t kGroup = 32;          // modes per partial sum: Faust's compile time is quadratic in the terms
-constexpr double kMaxPointDistance = 0.25;  // largest distance of a point from the surface, relative to the body's extent
-constexpr double kDefaultBlowNs = 0.01;     // default blow of the instrument
-constexpr double kDefaultPeak = 0.25;       // largest peak of such a blow, relative to full scale
+constexpr double kCritical = 5e-7;       // relative to omega: distance from critical damping
+constexpr std::size_t kGroup = 32;       // modes per partial sum: Faust's compile time is quadratic in the terms
+constexpr double kDefaultBlowNs = 0.01;  // default blow of the instrument
+constexpr double kDefaultPeak = 0.25;    // largest peak of such a blow, relative to full scale
 
 /// Constant part of each Faust file, after the numbers of the body.
 constexpr const char* kResonators = R"(
@@ -75,9 +72,10 @@ with {
 process = hammer : struck : *(hslider("[4] gain [unit:full scale per Pa]", USUAL_GAIN, 0.0, GREATEST_GAIN, SMALL_GAIN));
 )";
 
+/// A struck point, and of each mode the pressure at 1 m after a blow of 1 N s there [Pa].
 struct Place {
-  Vec3 point_m{}, inward{};
-  std::vector<double> gain{};  // (m) Pa / (N s) at 1 m
+  Vec3 point_m{};
+  std::vector<double> gain{};
 };
 
 std::vector<Vec3> choose_points(const bank::Bank& bank, const FaustOptions& options) {
@@ -88,16 +86,9 @@ std::vector<Vec3> choose_points(const bank::Bank& bank, const FaustOptions& opti
 }
 
 Place make_place(const bank::Bank& bank, const Vec3& point_m) {
-  const bank::NearestPlace found = bank::find_nearest(bank, point_m);
-  const auto [low, high] = bank::find_extent(bank.vertices_m);
-  if (found.triangle < 0 || !(found.distance_m <= kMaxPointDistance * norm(high - low)))
-    throw InputError(fmt::format("[{:g}, {:g}, {:g}] is not near the surface; give metres", point_m[0], point_m[1], point_m[2]));
-  const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[found.triangle]);
-  Place place{.point_m = found.point_m};
-  if (norm(across) > 0.0) place.inward = -1.0 * normalise(across);
-  const std::vector<double> shapes = bank::calc_shapes(bank, found.triangle, found.barycentric);
-  for (std::size_t m = 0; m < bank.mode_count(); ++m)
-    place.gain.push_back(bank.radiation_gain[m] * dot(Vec3{shapes[3 * m], shapes[3 * m + 1], shapes[3 * m + 2]}, place.inward));
+  const StruckPoint struck = find_struck_point(bank, point_m);
+  Place place{.point_m = struck.point_m};
+  for (std::size_t m = 0; m < bank.mode_count(); ++m) place.gain.push_back(bank.radiation_gain[m] * struck.velocity[m]);
   return place;
 }
 

@@ -51,7 +51,7 @@ RULES = {
     "runtime/acoustics/head": (["runtime/base"], ["fmt", "mysofa"]),
     "runtime/acoustics/recording": (["runtime/base"], ["fmt"]),
     "runtime/exchange/gltf": (["runtime/base"], ["fmt"]),
-    "runtime/exchange": (["runtime/base", "runtime/material", "runtime/bank", "runtime/acoustics"], ["cli", "eigen", "fmt"]),
+    "runtime/exchange": (["runtime/base", "runtime/material", "runtime/bank", "runtime/acoustics"], ["cli", "eigen", "fmt", "hdf5"]),
     "runtime/synth/nonlinear": (["runtime/base", "runtime/bank"], ["fmt"]),
     "runtime/synth": (["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics"], []),
     "runtime/physics/geometry": (["runtime/base", "runtime/bank"], []),
@@ -270,7 +270,7 @@ PUBLIC = {
 ONLY_IN = {
     "hdf5": re.compile(
         r"^((runtime/bank/[a-z0-9_]+|precompute/simulation/emission/surface_file|precompute/run/run_log|precompute/simulation/motion_file|"
-        r"precompute/mesh/vtkhdf/main)\.cpp|runtime/bank/hdf5_id\.hpp)$"
+        r"precompute/mesh/vtkhdf/main|runtime/exchange/to_sofa)\.cpp|runtime/bank/hdf5_id\.hpp)$"
     ),
     "cgal": re.compile(r"^precompute/mesher/[a-z0-9_]+\.(cpp|hpp)$"),
 }
