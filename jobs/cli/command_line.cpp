@@ -256,6 +256,32 @@ void add_bank_for(CLI::App& app, Shared& shared, Run& run) {
   set_work(*command, shared, run, options, run_bank_for);
 }
 
+void add_mesh2faust(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<Mesh2FaustOptions>();
+  CLI::App* command = app.add_subcommand("mesh2faust",
+                                         "Computes the modes of a closed surface and writes them as a Faust library, NAME.lib, with the "
+                                         "arguments of Faust's program mesh2faust.");
+  command->add_option("--infile", options->file, "Surface, an OBJ file in metres")->required();
+  command->add_option("--name", options->name, "Name of the model and of its file")->capture_default_str();
+  command->add_option("--material", options->material, "E [Pa], nu, rho [kg/m3], and for Rayleigh damping alpha [1/s] and beta [s]")
+      ->expected(3, 5)
+      ->option_text("E NU RHO [ALPHA BETA]");
+  command->add_option("--minmode", options->min_hz, "Lowest frequency of a mode")->capture_default_str();
+  command->add_option("--maxmode", options->max_hz, "Highest frequency of a mode")->capture_default_str();
+  const auto add_count = [&](const char* name, auto& value, const char* help) {
+    return command->add_option(name, value, help)->check(base::whole_range(1, kMaxRanks), base::describe_whole_range(1, kMaxRanks));
+  };
+  add_count("--nsynthmodes", options->modes, "Number of modes, the lowest of the band")->capture_default_str();
+  add_count("--nfemmodes", options->solved, "Accepted and not needed: all modes of the band are found");
+  add_count("--lmexpos", options->max_points, "Number of struck vertices, spread over the file; default: all");
+  command->add_option("--expos", options->vertices, "Struck vertices, numbered from 0 in the order of the file")->option_text("ID ...");
+  command->add_option("--accuracy", options->accuracy_cents, "Refine until every frequency is within so many cents; default: a preview");
+  command->add_flag("--freqcontrol", options->has_control, "Give the model its lowest frequency as a parameter");
+  command->add_flag("--showfreqs", options->shows_frequencies, "Print the frequencies");
+  command->add_flag("--debug", options->is_verbose, "Print the progress");
+  set_work(*command, shared, run, options, run_mesh2faust);
+}
+
 void add_materials(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<MaterialsOptions>();
   CLI::App* command =
@@ -376,8 +402,8 @@ Run parse_command_line(int argc, char** argv, Shared& shared) {
   app.add_option("--profile", shared.profile_option, "Profile file");
   app.add_flag("--json", shared.json, "One JSON document (from commands that keep running: one object per line)");
   app.set_version_flag("--version", base::describe("carillon"));
-  for (const auto add : {add_hear, add_explore, add_materials, add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run,
-                         add_get, add_gc, add_verify, add_validate, add_handed_over, add_report, add_bank_for})
+  for (const auto add : {add_hear, add_explore, add_materials, add_mesh2faust, add_submit, add_status, add_log, add_cancel, add_retry,
+                         add_explain, add_run, add_get, add_gc, add_verify, add_validate, add_handed_over, add_report, add_bank_for})
     add(app, shared, run);
   app.footer(kFooter);
   add_attempt(app, run);

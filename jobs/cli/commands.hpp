@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -129,6 +130,20 @@ struct MaterialsOptions {
   std::vector<std::string> names;  // empty: all, one line each
 };
 int run_materials(Shared& shared, const MaterialsOptions& options);
+
+/// carillon mesh2faust: a surface to a Faust library, with the arguments of Faust's program.
+struct Mesh2FaustOptions {
+  std::filesystem::path file;
+  std::string name = "modalModel";
+  std::vector<double> material;  // E [Pa], nu, rho [kg/m3], and optionally alpha [1/s], beta [s]; empty: aluminium
+  double min_hz = 20.0, max_hz = 10000.0;
+  std::size_t modes = 20, solved = 0;  // solved: accepted, without effect
+  std::vector<std::size_t> vertices;   // to be struck; empty: by max_points
+  std::optional<std::size_t> max_points;
+  std::optional<double> accuracy_cents;
+  bool has_control = false, shows_frequencies = false, is_verbose = false;
+};
+int run_mesh2faust(Shared& shared, const Mesh2FaustOptions& options);
 
 /// carillon attempt: one attempt at one job. Uses neither registry nor profile.
 struct AttemptOptions {
