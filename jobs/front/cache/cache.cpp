@@ -112,7 +112,8 @@ class Maker {
       } catch (const InputError&) {  // unreadable store: not found
       }
     }
-    if (!cache_.find_bank_fault(id, store::Look::content)) return cache_.bank_folder(id) / store::kBankFile;
+    // All bytes, but not the name of the input: here it is the user's own file, not a snapshot named by its content.
+    if (!cache_.find_bank_fault(id, store::Look::full)) return cache_.bank_folder(id) / store::kBankFile;
     if (cache_.has_bank_folder(id)) cache_.set_bank_aside(id);
     return {};
   }
