@@ -14,8 +14,8 @@ inline constexpr int kMaxAmbisonicOrder = 3;
 constexpr std::size_t count_ambisonic_channels(int order) { return static_cast<std::size_t>((order + 1) * (order + 1)); }
 inline constexpr std::size_t kMaxAmbisonicChannels = count_ambisonic_channels(kMaxAmbisonicOrder);
 
-/// Real spherical harmonics of a direction, in the order ACN with the normalisation SN3D (AmbiX: Nachbar, Zotter, Deleflie and Sontacchi
-/// 2011). `direction`: to the source; x forward, y left, z up; any length, zero counts as straight ahead.
+/// Real spherical harmonics of a direction, by number l^2 + l + m with the normalisation SN3D (AmbiX: Nachbar, Zotter, Deleflie and
+/// Sontacchi 2011). `direction`: to the source; x forward, y left, z up; any length, zero counts as straight ahead.
 inline std::array<double, kMaxAmbisonicChannels> calc_ambisonic_gains(const Vec3& direction) noexcept {
   const double length = norm(direction);
   const Vec3 unit = length > 0.0 ? (1.0 / length) * direction : Vec3{1.0, 0.0, 0.0};

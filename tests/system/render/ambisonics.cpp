@@ -1,4 +1,4 @@
-// libspatialaudio beside Ambisonics of carillon-render.
+// libspatialaudio, to which Ambisonics of carillon-render are compared.
 //   ambisonics ORDER AZIMUTH ELEVATION    prints the gain of each channel for a source there [rad]
 //   ambisonics cube FILE.f32              decodes order 1, interleaved frames of four floats, to a cube of loudspeakers: the energy of each
 #include <spatialaudio/Ambisonics.h>
