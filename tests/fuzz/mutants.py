@@ -75,6 +75,7 @@ WORDS = [
     "ground_reflection",
     "head",
     "hrtf",
+    "ambisonic",
     "begin",
     "hold",
     "end",
