@@ -31,6 +31,16 @@ TEST_F(File, reads_back_and_leaves_no_other_file) {
   EXPECT_EQ(count_entries(), 1u);
 }
 
+TEST_F(File, earlier_bytes_are_replaced) {
+  base::WholeFile file(folder_ / "x");
+  file.append("0123456789");
+  file.overwrite(2, "ab");
+  file.append("end");
+  file.overwrite(0, "-");
+  file.commit();
+  EXPECT_EQ(base::read_file(folder_ / "x", "test file", 100), "-1ab456789end");
+}
+
 TEST_F(File, only_regular_files_are_read) {
   ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
   for (const fs::path& path : {folder_ / "pipe", folder_, fs::path("/dev/zero"), folder_ / "missing"}) {
