@@ -16,6 +16,7 @@ import wave
 
 import h5py
 import numpy as np
+import scipy.io.wavfile
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 SOURCE = pathlib.Path(os.environ["CARILLON_SOURCE_DIR"])
@@ -151,7 +152,7 @@ class RenderProgram(unittest.TestCase):
         self.assertEqual(struct.unpack(">II", png[16:24]), (1400, 900))
 
     def test_other_file_formats_are_refused_and_quiet_is_quiet(self):
-        for name in ("out.mp3", "out.flac", "out"):
+        for name in ("out.mp3", "out.aiff", "out"):
             run = render(self.scene("named.json"), "-o", self.root / name)
             self.assertEqual(run.returncode, 2)
             self.assertRegex(run.stderr, rf"{name}: .*\.wav")
@@ -280,10 +281,9 @@ class RenderProgram(unittest.TestCase):
             run = render(self.root / f"{name}.json", "-o", self.root / f"{name}.wav", "--report", self.root / f"{name}-report.json", "-q")
             self.assertEqual(run.returncode, 0, run.stderr)
             self.assertEqual(json.loads((self.root / f"{name}-report.json").read_text())["channels"], channels)
-            with wave.open(str(self.root / f"{name}.wav")) as wav:
-                self.assertEqual((wav.getnchannels(), wav.getnframes()), (channels, 24000))
-                raw = np.frombuffer(wav.readframes(24000), dtype=np.uint8).reshape(-1, channels, 3)
-            self.assertTrue((raw.max(axis=(0, 2)) > 0).all())
+            _, samples = scipy.io.wavfile.read(self.root / f"{name}.wav")  # above two channels an extensible header
+            self.assertEqual(samples.shape, (24000, channels))
+            self.assertTrue((abs(samples).max(axis=0) > 0).all())
 
     def test_a_gain_that_would_clip_is_reduced_with_a_warning(self):
         run = render(self.scene("loud.json", output={"gain": 1e6}), "-o", self.root / "loud.wav")
@@ -947,7 +947,7 @@ class RenderProgram(unittest.TestCase):
         self.assert_refused(render(scene, "-o", self.root), 2, "folder")
         self.assert_refused(render(scene, "-o", scene), 2, "overwrite the scene")
         self.assert_refused(render(scene, "-o", self.root / "cube.h5"), 2, 'overwrite the bank of "cube"')
-        self.assert_refused(render(scene, "-o", self.root / "x.wav", "--report", self.root / "x.wav"), 2, "overwrite the WAV file")
+        self.assert_refused(render(scene, "-o", self.root / "x.wav", "--report", self.root / "x.wav"), 2, "overwrite the sound file")
         self.assert_refused(render(scene, "-o", self.root / "outputs.json" / "x.wav"), 2, "outputs.json")
         self.assert_refused(render(scene, "-o", self.root / "x.wav", "--spectrogram", "/proc/no/x.png"), 2, "/proc/no")
         self.assertFalse((self.root / "x.wav").exists())
