@@ -84,6 +84,7 @@ class VtuReader {
   void read_piece(const Piece& piece);
   std::vector<std::int64_t> read_regions(const Piece& piece);
   void read_point_sets(const Piece& piece, std::size_t first_node);
+  void read_doubt(const pugi::xml_node& array, std::size_t points, std::size_t first_node);
 
   Cursor file_;
   std::string xml_;         // without appended data
@@ -94,6 +95,7 @@ class VtuReader {
   std::unique_ptr<VtuData> data_;
   RawMesh raw_;
   std::map<std::string, std::vector<std::int64_t>> point_values_;  // concatenated over pieces
+  std::vector<Vec3> doubt_m_;
 };
 
 void VtuReader::cut_appended() {
@@ -193,6 +195,7 @@ void VtuReader::read_point_sets(const Piece& piece, std::size_t first_node) {
   std::size_t arrays = 0;
   for (const pugi::xml_node& array : piece.node.child("PointData").children("DataArray")) {
     const std::string name = array.attribute("Name").as_string();
+    if (name == kDoubtName && array.attribute("NumberOfComponents").as_int(1) == 3) read_doubt(array, piece.points, first_node);
     if (name.empty() || !is_integer(array.attribute("type").as_string()) || array.attribute("NumberOfComponents").as_int(1) != 1) continue;
     // These arrays are a convenience; hundreds of them are not node sets.
     if (++arrays > kMaxSetArrays || (point_values_.size() >= kMaxSetArrays && !point_values_.contains(name))) break;
@@ -200,6 +203,16 @@ void VtuReader::read_point_sets(const Piece& piece, std::size_t first_node) {
     auto& all = point_values_[name];
     all.resize(first_node, 0);
     all.insert(all.end(), values.begin(), values.end());
+  }
+}
+
+void VtuReader::read_doubt(const pugi::xml_node& array, std::size_t points, std::size_t first_node) {
+  const auto values = read_array<double>(array, 3 * points);
+  doubt_m_.resize(first_node);
+  for (std::size_t i = 0; i < points; ++i) {
+    doubt_m_.push_back({values[3 * i], values[3 * i + 1], values[3 * i + 2]});
+    for (const double x : doubt_m_.back())
+      if (!std::isfinite(x)) file_.fail(place_of(array), "an offset between two surfaces is not finite; write the mesh again");
   }
 }
 
@@ -272,11 +285,14 @@ TetMesh VtuReader::read() {
   for (const pugi::xml_node& node : grid.children("Piece"))
     read_piece({node, read_size(node, "NumberOfPoints"), read_size(node, "NumberOfCells"), place_of(node)});
   TetMesh mesh = build_mesh(std::move(raw_), file_, file_);
+  if (!doubt_m_.empty()) doubt_m_.resize(mesh.nodes_m.size());
+  mesh.doubt_m = std::move(doubt_m_);
   for (auto& [name, values] : point_values_) {
     auto& set = mesh.node_sets[name];
     for (std::size_t i = 0; i < values.size(); ++i)
       if (values[i] != 0) set.push_back(static_cast<std::int32_t>(i));
-    add_value_sets(name, values, 0, mesh);
+    const bool is_flag = std::all_of(values.begin(), values.end(), [](std::int64_t value) { return value == 0 || value == 1; });
+    if (!is_flag) add_value_sets(name, values, 0, mesh);
   }
   return mesh;
 }

@@ -18,4 +18,11 @@ void write_gmsh(const TetMesh& mesh, const std::filesystem::path& file, GmshEnco
 /// The bytes of that file.
 std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding = GmshEncoding::kBinary);
 
+/// Writes VTU for ParaView and VTK, atomically: node sets as point arrays of 0 and 1, regions as the cell array "region" (without names),
+/// as read_mesh reads them. Throws SystemError on write errors. Not collective.
+void write_vtu(const TetMesh& mesh, const std::filesystem::path& file);
+
+/// The bytes of that file.
+std::string make_vtu(const TetMesh& mesh);
+
 }  // namespace carillon::mesh

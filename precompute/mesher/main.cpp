@@ -121,11 +121,11 @@ void check_options(const Order& order) {
   if (order.nodes && order.edge) throw InputError("--nodes and --edge exclude each other; give one of them");
   if (order.straight && order.order.value_or(order.method == "extrude" ? 2 : 1) != 2)
     throw InputError("--straight is for tetrahedra of ten nodes; add --order 2");
-  if (!base::is_standard_output(order.out) && std::filesystem::path(order.out).extension() != ".msh") {
+  if (const std::string ending = base::find_extension(order.out);
+      !base::is_standard_output(order.out) && ending != ".msh" && ending != ".vtu") {
     throw InputError(
-        fmt::format("{}: the mesh is written in Gmsh's format (.vtu, .mesh and .node are read but not written); give the output a name "
-                    "that ends in .msh, "
-                    "or - for standard output",
+        fmt::format("{}: the mesh is written in Gmsh's format or as VTU (other formats are read but not written); give the output a name "
+                    "that ends in .msh or .vtu, or - for standard output (Gmsh's)",
                     order.out));
   }
   if (!order.shape.empty()) {
@@ -315,6 +315,8 @@ void make_mesh(const Order& order) {
   phase = Clock::now();
   if (is_piped)
     base::write_standard_output(mesh::make_gmsh(result.mesh));
+  else if (base::find_extension(order.out) == ".vtu")
+    mesh::write_vtu(result.mesh, order.out);
   else
     mesh::write_gmsh(result.mesh, order.out);
   result.seconds.emplace_back("write", calc_seconds(phase));
@@ -397,7 +399,7 @@ void make(int argc, char** argv, Order& order) {
   app.footer(describe_shapes());
   app.add_option("SURFACE", order.surface, "Closed surface, or with --wall an open one: OBJ, STL, PLY, OFF, glTF or GLB");
   app.add_option("--shape", order.shape, fmt::format("A parametric body in place of a surface: {}", fmt::join(list_shapes(), ", ")));
-  app.add_option("-o,--output", order.out, "The mesh to write, Gmsh 4.1 (.msh); - is standard output");
+  app.add_option("-o,--output", order.out, "The mesh to write, Gmsh 4.1 (.msh) or VTU (.vtu); - is standard output, as Gmsh 4.1");
   app.add_flag("--look", order.look,
                "Prints the contents of a surface or mesh file as JSON, without meshing: triangles, extents in its own units, openings, "
                "parts, and the thickness of a surface that is both sides of a wall; of a mesh nodes, tetrahedra and extents");
@@ -451,7 +453,7 @@ void make(int argc, char** argv, Order& order) {
   complete_radius(order);
   if (order.look) return print_look(order);
   if (order.coarsen) return write_coarse(order);
-  if (order.out.empty()) throw InputError("-o is missing: give the file for the mesh, whose name ends in .msh");
+  if (order.out.empty()) throw InputError("-o is missing: give the file for the mesh, whose name ends in .msh or .vtu");
   make_mesh(order);
 }
 

@@ -81,6 +81,24 @@ INSTANTIATE_TEST_SUITE_P(fixtures, Written,
                          testing::Combine(testing::Values("gmsh41_text_1.msh", "gmsh41_binary_2.msh", "vtk_raw_1.vtu"),
                                           testing::Values(GmshEncoding::kBinary, GmshEncoding::kText)));
 
+TEST(write, vtu_round_trip) {
+  for (const char* file : {"gmsh41_text_1.msh", "gmsh41_binary_2.msh"}) {
+    const tests::Folder scratch;
+    TetMesh mesh = read_mesh(fixture(file));
+    mesh.node_sets["a <b> & \"c\""] = {0, 5};
+    mesh.node_sets["none"] = {};
+    mesh.doubt_m.assign(mesh.nodes_m.size(), Vec3{1e-5, 0, 1.0 / 3});
+    write_vtu(mesh, scratch / "out.vtu");
+    const TetMesh back = read_mesh(scratch / "out.vtu");
+    EXPECT_EQ(back.order, mesh.order);
+    EXPECT_EQ(back.nodes_m, mesh.nodes_m);
+    EXPECT_EQ(back.doubt_m, mesh.doubt_m);
+    EXPECT_EQ(back.tets, mesh.tets);
+    EXPECT_EQ(back.regions, mesh.regions);
+    EXPECT_EQ(back.node_sets, mesh.node_sets);
+  }
+}
+
 TEST(write, mesh_without_regions) {
   for (const char* file : {"vtk_raw_1.vtu", "gmsh41_binary_2.msh"}) {
     const tests::Folder scratch;
