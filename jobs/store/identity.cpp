@@ -20,6 +20,7 @@
 #include "jobs/store/process/process.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/includes.hpp"
 #include "runtime/base/json.hpp"
 
 namespace carillon::store {
@@ -28,6 +29,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMeshHeadBytes = 4096;
+constexpr std::uint64_t kMaxJoinedBytes = 32ULL << 30;
 constexpr std::size_t kMaxTexts = 50;
 constexpr const char* kScheme = "carillon identity 1";
 
@@ -93,6 +95,8 @@ std::string lower_ending(const fs::path& file) {
 
 /// By the same rule as the mesh reader: from the content if conclusive, else from the file extension.
 std::string find_mesh_format(const std::string& head, const std::string& ending) {
+  for (const char* cae : {"inp", "bdf", "nas", "unv", "uff"})
+    if (ending == cae) return ending;
   std::string_view text = head;
   if (text.starts_with("\x89HDF\r\n")) return "hdf";
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
@@ -119,6 +123,16 @@ std::string find_user() {
   return found != nullptr ? to_text(found->pw_name) : fmt::format("{}", ::geteuid());
 }
 
+/// Passes the bytes of an input to `take`, with the files that it includes, and returns their hash.
+Id hash_joined(const fs::path& file, std::string_view what, const std::function<void(std::string_view)>& take,
+               bool* has_includes = nullptr) {
+  if (!base::may_include(file)) return hash_file(file, what, take);
+  const base::JoinedText joined = base::read_joined(file, what, kMaxJoinedBytes);
+  if (has_includes != nullptr) *has_includes = joined.origins.size() > 1;
+  take(joined.text);
+  return hash_text(joined.text);
+}
+
 /// Copies a file to `target` and returns its hash.
 Id copy_hashed(const fs::path& file, std::string_view what, const fs::path& target) {
   const int fd = ::open(target.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0444);
@@ -133,7 +147,7 @@ Id copy_hashed(const fs::path& file, std::string_view what, const fs::path& targ
     if (error != 0) throw_errno(target, "write", error);
   };
   try {
-    const Id id = hash_file(file, what, write_all);
+    const Id id = hash_joined(file, what, write_all);
     if (::fsync(fd) != 0) throw_errno(target, "write", errno);
     ::close(fd);
     return id;
@@ -251,12 +265,14 @@ const RequestMaker::Known& RequestMaker::find_input(const fs::path& file, const 
                                               info.st_mtim.tv_sec * 1'000'000'000LL + info.st_mtim.tv_nsec,
                                               info.st_ctim.tv_sec * 1'000'000'000LL + info.st_ctim.tv_nsec};
   const auto found = known_.find(file);
-  if (is_there && found != known_.end() && found->second.stamp == stamp) return found->second;
+  if (is_there && found != known_.end() && found->second.stamp == stamp && !found->second.has_includes) return found->second;
   std::string head;
-  const Id id = hash_file(file, what, [&](std::string_view bytes) {
+  bool has_includes = false;  // their changes do not show in the stamp
+  const auto take_head = [&](std::string_view bytes) {
     if (head.size() < kMeshHeadBytes) head += bytes.substr(0, kMeshHeadBytes - head.size());
-  });
-  return known_.insert_or_assign(file, Known{id, head, stamp}).first->second;
+  };
+  const Id id = hash_joined(file, what, take_head, &has_includes);
+  return known_.insert_or_assign(file, Known{id, head, stamp, has_includes}).first->second;
 }
 
 Input RequestMaker::find_hashed(const NamedInput& named) {

@@ -30,6 +30,7 @@ class RequestMaker {
     Id sha256;
     std::string head;                  // first 4096 bytes
     std::array<long long, 5> stamp{};  // device, inode, size, mtime, ctime
+    bool has_includes = false;
   };
   const Known& find_input(const std::filesystem::path& file, const std::string& what);
   Input find_hashed(const NamedInput& named);

@@ -3,10 +3,13 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "precompute/fem/element.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/material/solids.hpp"
+#include "runtime/material/table.hpp"
 
 namespace carillon::fem {
 namespace {
@@ -57,9 +60,61 @@ std::string describe(const std::vector<std::int32_t>& tags, const std::map<std::
   return tags.size() > kMax ? fmt::format("{} and {} more", text, tags.size() - kMax) : text;
 }
 
+/// Broadcasts rank 0's materials of the mesh file. Collective.
+FileMaterials broadcast_materials(const comm::Communicator& comm, const FileMaterials& materials) {
+  const auto tags = comm.broadcast([&] {
+    std::vector<std::int32_t> keys;
+    for (const auto& [tag, material] : materials) keys.push_back(tag);
+    return keys;
+  });
+  const auto texts = comm.broadcast([&] {
+    std::vector<std::string> list;
+    for (const auto& [tag, m] : materials) list.insert(list.end(), {m.name, m.place, m.problem});
+    return list;
+  });
+  const auto numbers = comm.broadcast([&] {
+    std::vector<double> list;
+    for (const auto& [tag, m] : materials)
+      list.insert(list.end(), {m.young_modulus_pa, m.poisson_ratio, m.density_kg_m3, m.alpha1_s, m.alpha2_per_s, m.loss_factor});
+    return list;
+  });
+  return comm.agree([&] {
+    FileMaterials all;
+    for (std::size_t i = 0; i < tags.size(); ++i) {
+      const std::string* const text = &texts[3 * i];
+      const double* const n = &numbers[6 * i];
+      all[tags[i]] = {text[0], n[0], n[1], n[2], n[3], n[4], n[5], text[1], text[2]};
+    }
+    return all;
+  });
+}
+
+/// "material": "file" for the regions that the job does not name; equal ones become one material.
+void match_file_materials(const std::vector<std::int32_t>& rest, const std::map<std::int32_t, std::string>& names,
+                          const FileMaterials& file_materials, const job::JobSpec& job, std::map<std::int32_t, std::int32_t>& place,
+                          Materials& out) {
+  std::map<std::string, std::int32_t> known;  // by place in the file
+  for (const std::int32_t tag : rest) {
+    const auto found = file_materials.find(tag);
+    if (found == file_materials.end())
+      throw InputError(
+          fmt::format("{}: \"material\": \"file\": the mesh file has no material for {}; give it a section (*SOLID SECTION, "
+                      "PSOLID), or name a material in the job",
+                      job.material.place, tag == 0 ? "some elements" : "region " + describe(tag, names)));
+    const auto [entry, is_new] = known.try_emplace(found->second.place, static_cast<std::int32_t>(out.list.size()));
+    place[tag] = entry->second;
+    if (!is_new) continue;
+    std::string remark;
+    out.list.push_back(make_material(found->second, remark));
+    const auto name = names.find(tag);
+    out.region.push_back(name == names.end() ? std::to_string(tag) : name->second);
+    if (!remark.empty()) out.remarks.push_back(remark);
+  }
+}
+
 /// Material index of each region. Throws InputError.
 std::map<std::int32_t, std::int32_t> match(const std::vector<std::int32_t>& regions, const std::map<std::int32_t, std::string>& names,
-                                           const job::JobSpec& job, Materials& out) {
+                                           const FileMaterials& file_materials, const job::JobSpec& job, Materials& out) {
   std::map<std::int32_t, std::int32_t> place;
   for (const auto& [key, material] : job.materials) {
     const auto is_named = [&, &key = key](std::int32_t tag) {
@@ -85,6 +140,10 @@ std::map<std::int32_t, std::int32_t> match(const std::vector<std::int32_t>& regi
   for (const std::int32_t tag : regions)
     if (!place.contains(tag)) rest.push_back(tag);
   if (rest.empty()) return place;
+  if (job.takes_file_material) {
+    match_file_materials(rest, names, file_materials, job, place, out);
+    return place;
+  }
   if (!job.has_material)
     throw InputError(
         fmt::format("{}: \"materials\": no material for region{} {} of the mesh; add {}, or \"material\" for all regions that "
@@ -98,14 +157,66 @@ std::map<std::int32_t, std::int32_t> match(const std::vector<std::int32_t>& regi
 
 }  // namespace
 
+material::Material make_material(const mesh::FileMaterial& file, std::string& remark) {
+  if (!file.problem.empty()) throw InputError(file.problem);
+  material::Material made;
+  made.name = file.name;
+  made.place = file.place;
+  made.young_modulus_pa = file.young_modulus_pa;
+  made.poisson_ratio = file.poisson_ratio;
+  made.density_kg_m3 = file.density_kg_m3;
+  const auto refuse = [&](const char* what, double value, double low, double high) {
+    if (!(value >= low && value <= high))
+      throw InputError(fmt::format("{}: material '{}': {} is {:g}, outside {:g} to {:g}; check the unit of the file", file.place, file.name,
+                                   what, value, low, high));
+  };
+  refuse("Young's modulus in Pa", made.young_modulus_pa, material::kMinStiffnessPa, material::kMaxStiffnessPa);
+  refuse("Poisson's ratio", made.poisson_ratio, -1.0 + 1e-7, 0.5 - 1e-7);
+  refuse("the loss factor", file.loss_factor, 0.0, 1.999);
+  refuse("the stiffness-proportional damping", file.alpha1_s, 0.0, 1e6);
+  refuse("the mass-proportional damping", file.alpha2_per_s, 0.0, 1e12);
+  if (file.loss_factor > 0.0) {
+    made.law = material::DampingLaw::internal_friction;
+    made.tan_phi = file.loss_factor;
+    return made;
+  }
+  made.alpha1_s = file.alpha1_s;
+  made.alpha2_per_s = file.alpha2_per_s;
+  if (file.alpha1_s > 0.0 || file.alpha2_per_s > 0.0) return made;
+  const material::Row* nearest = nullptr;
+  const auto distance = [&](const material::Material& other) {
+    return std::abs(std::log(other.young_modulus_pa / made.young_modulus_pa)) +
+           std::abs(std::log(other.density_kg_m3 / made.density_kg_m3));
+  };
+  for (const material::Row& row : material::MaterialTable::get().rows())
+    if (nearest == nullptr || distance(row.material) < distance(nearest->material)) nearest = &row;
+  made.law = nearest->material.law;
+  made.alpha1_s = nearest->material.alpha1_s;
+  made.alpha2_per_s = nearest->material.alpha2_per_s;
+  made.tan_phi = nearest->material.tan_phi;
+  made.caughey = nearest->material.caughey;
+  made.loss_table = nearest->material.loss_table;
+  remark = fmt::format("{}: material '{}' has no damping; it is damped like {}, the nearest solid in stiffness and density", file.place,
+                       file.name, nearest->material.name);
+  return made;
+}
+
 Materials find_materials(const comm::Communicator& comm, const LocalMesh& local, const job::JobSpec& job,
-                         const std::map<std::int32_t, std::string>& region_names) {
-  if (job.materials.empty()) return job.material;
+                         const std::map<std::int32_t, std::string>& region_names, const FileMaterials& file_materials) {
+  if (job.materials.empty() && !job.takes_file_material) return job.material;
   const std::vector<std::int32_t> regions = find_regions(comm, local);
   const auto names = broadcast_names(comm, region_names);
+  const FileMaterials of_file = broadcast_materials(comm, file_materials);
   Materials materials;
   comm.agree([&] {
-    const auto place = match(regions, names, job, materials);
+    const auto place = match(regions, names, of_file, job, materials);
+    if (job.materials.empty() && materials.list.size() == 1) {
+      materials.region.clear();
+      return;
+    }
+    if (job.sensitivities > 0)
+      throw InputError(fmt::format("{}: \"sensitivities\" are for bodies of one material, and the mesh file has {}; remove them",
+                                   job.file.string(), materials.list.size()));
     materials.of_tet.reserve(local.tet_count());
     for (const std::int32_t tag : local.region) materials.of_tet.push_back(place.at(tag));
   });

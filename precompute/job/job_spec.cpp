@@ -57,6 +57,13 @@ void read_materials(base::Object& job, JobSpec& spec) {
       spec.materials[region] = read(*materials, region);
     }
   }
+  if (job.has_string("material") && job.string("material") == kFileMaterial) {
+    if (spec.mesh.empty())
+      job.fail("material", "\"file\" is the material of a mesh file (.inp, .bdf), and this job has none; name a material");
+    spec.takes_file_material = true;
+    spec.material.place = job.find_place("material");
+    return;
+  }
   spec.has_material = spec.materials.empty() || job.has("material");
   spec.material = spec.has_material ? read(job, "material") : spec.materials.begin()->second;
 }

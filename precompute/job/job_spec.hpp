@@ -101,6 +101,7 @@ struct JobSpec {
   Shapes shapes = Shapes::packed;             // in the bank
   int sensitivities = 0;                      // modes with sensitivities, the lowest; 0: none
   Material material;                          // of the whole body, or of regions not in `materials`
+  bool takes_file_material = false;           // "material": "file": the mesh file has it
   bool has_material = true;                   // false: `materials` must cover all regions; `material` is its first
   std::map<std::string, Material> materials;  // by region of the mesh: its tag as text, or its name
   Element element = Element::T10;

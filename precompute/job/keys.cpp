@@ -21,7 +21,7 @@ const base::Keys<JobSpec> kJobKeys{
      "within 1 % of the last; for one material"},
     {"accuracy_cents", &JobSpec::accuracy_cents, Limits{1e-3, 1200},
      "chooses element, mesh size and `solver.tolerance`: [choose-accuracy](choose-accuracy.md)"},
-    {"material", "required", "name (`\"steel\"`) or object: [materials](materials.md)"},
+    {"material", "required", "name (`\"steel\"`) or object: [materials](materials.md); `\"file\"`: [of the mesh file](cae-meshes.md)"},
     {"materials", "none", "one material per region of the mesh, by tag or name; `material` is for the others"},
     {"band_hz", "`[20, 20000]`", "undamped frequencies to find; every mode of the band is found, or the program fails"},
     {"max_modes", &JobSpec::max_modes, Limits{1, 40000}, "maximum number of modes, the lowest of the band"},

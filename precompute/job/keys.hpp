@@ -17,6 +17,8 @@ inline const std::vector<std::string> kMethodNames{"automatic", "block-lanczos",
 inline const std::vector<std::string> kFactorisationNames{"automatic", "ldlt", "mumps"};
 inline const std::vector<std::string> kAirNames{"none", "auto", "bem"};
 
+inline constexpr const char* kFileMaterial = "file";  // "material"
+
 inline constexpr double kMaxHz = 1e12;
 inline constexpr double kMinBodyM = 1e-6, kMaxBodyM = 1e4;
 inline constexpr base::Limits kBodyLength{kMinBodyM, kMaxBodyM};

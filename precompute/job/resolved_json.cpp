@@ -137,7 +137,7 @@ std::string resolved_json(const JobSpec& job, const fs::path& folder, const std:
   if (!job.bank.empty()) root["bank"] = relative_to(job.bank, base);
   root["shapes"] = to_text(job.shapes);
   if (job.sensitivities > 0) root["sensitivities"] = job.sensitivities;
-  if (job.has_material) root["material"] = write_material(job.material);
+  if (job.has_material) root["material"] = job.takes_file_material ? base::Json(kFileMaterial) : write_material(job.material);
   for (const auto& [region, material] : job.materials) root["materials"][region] = write_material(material);
   root["band_hz"] = base::Json::array(job.band_hz);
   if (job.max_modes) root["max_modes"] = *job.max_modes;

@@ -58,6 +58,10 @@ void add_value_sets(const std::string& prefix, const std::vector<std::int64_t>& 
 TetMesh parse_gmsh(std::string_view bytes, const std::string& name);
 TetMesh parse_medit(std::string_view bytes, const std::string& name);
 TetMesh parse_vtu(std::string_view bytes, const std::string& name);
+/// `origins`: files that the text was joined from.
+TetMesh parse_inp(std::string_view bytes, const std::string& name, std::span<const base::TextOrigin> origins = {});
+TetMesh parse_bdf(std::string_view bytes, const std::string& name, std::span<const base::TextOrigin> origins = {});
+TetMesh parse_unv(std::string_view bytes, const std::string& name);
 TetMesh parse_tetgen(std::string_view node_bytes, const std::string& node_name, std::string_view ele_bytes, const std::string& ele_name);
 
 }  // namespace carillon::mesh

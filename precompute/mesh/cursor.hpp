@@ -5,11 +5,13 @@
 
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/includes.hpp"
 
 namespace carillon::mesh {
 
@@ -27,6 +29,8 @@ class Cursor {
     swap_ = swap_bytes;
   }
   void set_comment(char mark) { comment_ = mark; }
+  /// Files of which the text is joined, for messages; kept by the caller.
+  void set_origins(std::span<const base::TextOrigin> origins) { origins_ = origins; }
 
   std::size_t place() const { return at_; }
   std::size_t remaining() const { return bytes_.size() - at_; }
@@ -34,6 +38,8 @@ class Cursor {
   std::string_view bytes() const { return bytes_; }
   void seek(std::size_t place) { at_ = place; }
 
+  /// "name:line" of a position in text.
+  std::string find_place(std::size_t place) const;
   /// Throws InputError "name:line: message" or "name: byte N: message".
   template <class... Args>
   [[noreturn]] void fail(std::size_t place, fmt::format_string<Args...> format, Args&&... args) const {
@@ -83,6 +89,7 @@ class Cursor {
   bool binary_ = false;
   bool swap_ = false;
   char comment_ = '\0';
+  std::span<const base::TextOrigin> origins_;
 };
 
 }  // namespace carillon::mesh

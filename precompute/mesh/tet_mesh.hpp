@@ -1,4 +1,4 @@
-// Tetrahedral volume mesh: serial, complete, in SI metres.
+// Tetrahedral volume mesh: serial, complete, in SI metres (as read_mesh returns it, in the unit of its file).
 #pragma once
 
 #include <array>
@@ -12,6 +12,18 @@
 
 namespace carillon::mesh {
 
+/// Isotropic solid of a mesh file, in SI units.
+struct FileMaterial {
+  std::string name;
+  double young_modulus_pa = 0.0;
+  double poisson_ratio = 0.0;
+  double density_kg_m3 = 0.0;
+  double alpha1_s = 0.0, alpha2_per_s = 0.0;  // Rayleigh damping
+  double loss_factor = 0.0;                   // structural damping
+  std::string place;                          // "file:line"
+  std::string problem;                        // why a body cannot be made of it; empty: it can
+};
+
 /// Linear (4 nodes) or quadratic (10 nodes) tetrahedra. Node order of an element: corners 0 1 2 3 with det(x1 - x0, x2 - x0, x3 - x0) > 0,
 /// then the mid-side nodes of edges 01, 12, 02, 03, 13, 23 (VTK order).
 struct TetMesh {
@@ -24,6 +36,13 @@ struct TetMesh {
   // (N) [m] Ambiguous surfaces (facets may be planes or samples of a smooth surface): offset from each node to the alternative surface,
   // zero where unambiguous. Empty: unambiguous everywhere.
   std::vector<Vec3> doubt_m;
+
+  // Of CAE files only.
+  std::map<std::int32_t, FileMaterial> materials = {};  // by region tag
+  double unit_m = 1.0;                                  // metres per unit of nodes_m
+  std::string unit = {};                                // the unit and its reason; empty: metres by convention
+  std::string supports = {};                            // node set of the supports of the file; empty: none
+  std::vector<std::string> remarks = {};                // parts of the model that a body cannot have
 
   int nodes_per_tet() const { return order == 1 ? 4 : 10; }
   std::int64_t tet_count() const { return static_cast<std::int64_t>(tets.size()) / nodes_per_tet(); }

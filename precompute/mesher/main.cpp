@@ -372,6 +372,26 @@ void write_coarse(const Order& order) {
   base::write_file(order.out, text);
 }
 
+/// Sets, regions, unit, materials and supports of a mesh file.
+void describe_model(const mesh::TetMesh& mesh, base::Json& root) {
+  root.set("node_sets", base::Json::object()).set("regions", base::Json::object());
+  for (const auto& [name, nodes] : mesh.node_sets) root["node_sets"].set(base::printable(name), nodes.size());
+  for (const auto& [tag, name] : mesh.region_names) root["regions"].set(std::to_string(tag), base::printable(name));
+  if (!mesh.unit.empty()) root.set("unit_m", base::finite_or_null(mesh.unit_m, base::significant, 12)).set("unit", mesh.unit);
+  if (!mesh.supports.empty()) root.set("supports", mesh.supports);
+  if (!mesh.remarks.empty()) root.set("remarks", base::Json::array(mesh.remarks));
+  if (mesh.materials.empty()) return;
+  const auto number = [](double value) { return base::finite_or_null(value, base::significant, 12); };
+  root.set("materials", base::Json::object());
+  for (const auto& [tag, material] : mesh.materials) {
+    base::Json entry = base::Json::object();
+    entry.set("name", base::printable(material.name)).set("young_modulus_pa", number(material.young_modulus_pa));
+    entry.set("poisson_ratio", number(material.poisson_ratio)).set("density_kg_m3", number(material.density_kg_m3));
+    if (!material.problem.empty()) entry.set("problem", base::printable(material.problem));
+    root["materials"].set(std::to_string(tag), entry);
+  }
+}
+
 /// --look
 void print_look(const Order& order) {
   if (order.surface.empty()) throw InputError("--look is for surfaces and meshes; give a file");
@@ -381,6 +401,7 @@ void print_look(const Order& order) {
     base::Json root = base::Json::object();
     root.set("mesh", order.surface).set("nodes", check.nodes).set("tets", check.tets).set("parts", check.components);
     root.set("unused_nodes", check.unreferenced).set("extent", base::Json::array(check.box_high - check.box_low));
+    describe_model(mesh, root);
     fmt::print("{}\n", root.line());
     return;
   }

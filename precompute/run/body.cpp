@@ -81,15 +81,14 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
   body.mesher_warnings = std::move(words.warnings);
   for (const std::string& warning : body.mesher_warnings) run.log.warn_once(warning);
   for (const std::string& remark : words.remarks) run.log.print(remark);
-  if (job.mesh_scale != 1.0) {
-    for (std::vector<Vec3>* lengths : {&mesh.nodes_m, &mesh.doubt_m}) {
-      for (Vec3& length : *lengths) {
-        for (double& x : length) x *= job.mesh_scale;
-      }
-    }
-  }
+  const std::string unit = std::move(mesh.unit);
+  const double scale = mesh::scale_lengths(mesh, job.mesh_scale);
+  if (!unit.empty() && scale != job.mesh_scale)
+    run.log.print(fmt::format("the mesh file is read with {:g} m per unit, since {}; \"mesh_scale\" of the job changes it", scale, unit));
+  for (const std::string& remark : mesh.remarks) run.log.warn_once(remark);
   body.check = mesh::check_mesh(mesh, body.source);
   body.region_names = mesh.region_names;
+  body.file_materials = std::move(mesh.materials);
   warn_of_mesh(run, body);
   if (job.body && job.body->shape.empty() && body.check.components > 1)
     run.log.warn_once(fmt::format("the surface has {} disconnected parts, which vibrate independently", body.check.components));

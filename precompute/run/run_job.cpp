@@ -125,12 +125,12 @@ bank::Proof make_proof(const eigen::Modes& modes) {
 }
 
 /// Sensitivities of a bank whose surface still has the mesh's order. Rank 0 only.
-bank::Sensitivities make_sensitivities(const job::JobSpec& job, const Body& body, const error_bars::ErrorBars& bars, const bank::Bank& bank,
-                                       const fem::Derivatives& derivatives) {
+bank::Sensitivities make_sensitivities(const material::Material& material, const Body& body, const error_bars::ErrorBars& bars,
+                                       const bank::Bank& bank, const fem::Derivatives& derivatives) {
   std::vector<std::uint8_t> fixed;
   for (const std::int32_t row : body.surface.row) fixed.push_back(row < 0 ? 1 : 0);
   const std::size_t count = derivatives.values.size() / derivatives.parameters.size();
-  bank::Sensitivities made = bank::calc_sensitivities(bank, job.material.calc_elasticity_pa(), job.material.density_kg_m3, count, fixed);
+  bank::Sensitivities made = bank::calc_sensitivities(bank, material.calc_elasticity_pa(), material.density_kg_m3, count, fixed);
   made.parameters = base::Json::array(derivatives.parameters).line();
   made.by_parameter = derivatives.values;
   for (std::size_t m = 0; m < count; ++m) made.own_error_cents.push_back(bars.corrected.own_cents[m] + bars.algebraic_cents[m]);
@@ -177,7 +177,8 @@ bank::Bank make_bank(const job::JobSpec& job, Solution& found, io::SurfaceModes&
   bank.complete = modes.band_count == static_cast<std::int64_t>(modes.lambda.size());
   bank.element = job::to_text(found.setting.element);
   bank.mass = job::to_text(job.mass);
-  if (!derivatives.parameters.empty()) bank.sensitivities = make_sensitivities(job, body, solved.errors.bars, bank, derivatives);
+  if (!derivatives.parameters.empty())
+    bank.sensitivities = make_sensitivities(solved.properties.materials.list.front(), body, solved.errors.bars, bank, derivatives);
   if (job.max_modes) bank::keep_lowest(bank, static_cast<std::size_t>(*job.max_modes));
   return bank;
 }
@@ -218,7 +219,7 @@ bank::Bank collect_bank(Run& run, Solution& found) {
   fem::Derivatives derivatives;
   if (run.job.sensitivities > 0 && !omega.empty()) {
     const std::size_t count = count_sensitive(solved.modes.lambda, static_cast<std::size_t>(run.job.sensitivities));
-    derivatives = fem::calc_derivatives(run.comm, found.body.pieces.local, run.job.material, run.job.mass,
+    derivatives = fem::calc_derivatives(run.comm, found.body.pieces.local, solved.properties.materials.list.front(), run.job.mass,
                                         std::span(solved.modes.lambda).first(count), solved.modes.shapes);
   }
   solved.modes.shapes.reset();

@@ -44,6 +44,7 @@ struct Body {
   std::int64_t fixed_nodes = 0;                      // rank 0
   Surface surface;                                   // rank 0
   std::map<std::int32_t, std::string> region_names;  // rank 0
+  fem::FileMaterials file_materials;                 // rank 0
   std::string source;                                // "bunny.msh", "bar, 2000 nodes wanted"; for messages
 };
 

@@ -54,7 +54,9 @@ AssembledSystem assemble_system(Run& run, const Setting& setting, const Body& bo
   const mesh::LocalMesh& mesh = body.pieces.local;
   AssembledSystem system;
   BodyProperties& properties = system.properties;
-  properties.materials = fem::find_materials(run.comm, mesh, run.job, body.region_names);  // its errors name the job's line
+  properties.materials =
+      fem::find_materials(run.comm, mesh, run.job, body.region_names, body.file_materials);  // its errors name the job's line
+  for (const std::string& remark : properties.materials.remarks) run.log.warn_once(remark);
   system.matrices = name_errors(body.source, run, [&] { return fem::assemble(run.comm, mesh, properties.materials, run.job.mass); });
   properties.volume_m3 = fem::calc_volumes(run.comm, mesh, properties.materials);
   properties.rigid = fem::calc_rigid_body(run.comm, mesh, properties.materials);

@@ -79,7 +79,8 @@ void analyse(Run& run, const Setting& setting, Prediction& found) {
 
 /// For bodies too large to be assembled here: powers of the unknowns.
 void extrapolate(Run& run, Prediction& found) {
-  found.properties.materials = fem::find_materials(run.comm, found.body.pieces.local, run.job, found.body.region_names);
+  found.properties.materials =
+      fem::find_materials(run.comm, found.body.pieces.local, run.job, found.body.region_names, found.body.file_materials);
   found.properties.volume_m3 = fem::calc_volumes(run.comm, found.body.pieces.local, found.properties.materials);
   const cost::ProblemSize whole = cost::complete(found.size);
   found.solve.entries = whole.factor_entries;

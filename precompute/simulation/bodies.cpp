@@ -50,7 +50,8 @@ mesh::TetMesh make_mesh(const job::SimulatedBody& body, std::vector<std::string>
     warnings = std::move(words.warnings);
   } else {
     mesh = mesh::read_mesh(body.mesh);
-    for (Vec3& x : mesh.nodes_m) x = body.mesh_scale * x;
+    mesh::scale_lengths(mesh, body.mesh_scale);
+    warnings = std::move(mesh.remarks);
   }
   const mesh::CheckReport check = mesh::check_mesh(mesh, fmt::format("body \"{}\"", body.name));
   warnings.insert(warnings.end(), check.warnings.begin(), check.warnings.end());

@@ -129,7 +129,7 @@ RULES = {
     "precompute/petsc/profile": (["runtime/base"], ["mpi"]),
     "precompute/la": (["runtime/base", "precompute/comm", "precompute/petsc"], ["eigen", "mpi", "petsc"]),
     "precompute/fem": (
-        ["runtime/base", "precompute/job", "precompute/comm", "precompute/mesh", "precompute/petsc"],
+        ["runtime/base", "runtime/material", "precompute/job", "precompute/comm", "precompute/mesh", "precompute/petsc"],
         ["fmt", "mpi", "petsc"],
     ),
     "precompute/fem/error_bars": (

@@ -40,6 +40,10 @@ bool is_gltf(const std::filesystem::path& file) {
 double guess_scale(const Order& options, const SurfaceFacts& look, std::vector<std::string>& assumed) {
   const double largest = *std::max_element(look.extent.begin(), look.extent.end());
   const std::string file = options.object.filename().string();
+  if (!look.unit.empty()) {
+    assumed.push_back(fmt::format("size: {}, since {}; change it with --scale", format_extent(look.extent, look.unit_m), look.unit));
+    return look.unit_m;
+  }
   if (look.is_mesh || is_gltf(options.object)) {  // glTF is in metres by its specification
     const char* const what = look.is_mesh ? "meshes are" : "glTF is";
     const char* const remedy =

@@ -12,6 +12,8 @@ namespace carillon::hear {
 /// The output of `carillon-mesh --look` for a surface or a mesh.
 struct SurfaceFacts {
   bool is_mesh = false;  // tetrahedra; only the extent is known
+  double unit_m = 1.0;   // of a mesh file that names it
+  std::string unit;      // the reason; empty: metres by convention
   long long triangles = 0, parts = 0, openings = 0;
   std::array<double, 3> extent{};  // in the file's units
   double thickness = 0.0;          // of a surface with both sides of a wall, in the file's units; 0: none

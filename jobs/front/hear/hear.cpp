@@ -49,6 +49,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kMaxModes = 600;                // with accuracy_cents
 constexpr const char* kExplorer = "explore";  // folder of the page
+constexpr const char* kOfFile = "file";       // material of the mesh file, as jobs name it
 constexpr std::size_t kStrikes = 4, kListed = 12;
 constexpr long long kMaxUnused = 1'000'000'000'000;
 constexpr double kSameCents = 5.0;                       // allowed error of scaling with unchanged Poisson's ratio
@@ -67,7 +68,8 @@ std::string clean(const std::string& name) {
 }
 
 bool is_mesh_file(const fs::path& file) {
-  constexpr std::array<std::string_view, 7> kEndings{".msh", ".vtu", ".vtk", ".mesh", ".node", ".ele", ".vtkhdf"};
+  constexpr std::array<std::string_view, 12> kEndings{".msh", ".vtu",    ".vtk", ".mesh", ".node", ".ele",
+                                                      ".inp", ".vtkhdf", ".bdf", ".nas",  ".unv",  ".uff"};
   return std::find(kEndings.begin(), kEndings.end(), base::find_extension(file)) != kEndings.end();
 }
 
@@ -78,7 +80,7 @@ bool is_surface_file(const fs::path& file) {
 
 /// InputError if the object is neither a surface nor a mesh, with a remedy for other kinds of files.
 void check_object(const fs::path& object) {
-  constexpr const char* kTakes = "a surface (.obj, .stl, .ply, .off, .gltf, .glb) or a mesh (.msh, .vtu, .mesh)";
+  constexpr const char* kTakes = "a surface (.obj, .stl, .ply, .off, .gltf, .glb) or a mesh (.msh, .vtu, .mesh, .inp, .bdf, .unv)";
   const std::string name = object.string(), ending = base::find_extension(object);
   std::error_code error;
   if (!fs::exists(object, error)) throw InputError(fmt::format("{}: no such file{}; give {}", name, base::hint_backslash(object), kTakes));
@@ -196,14 +198,16 @@ class Listening {
   void look() {
     stem_ = explore::cut_name(clean(is_shape() ? order_.shape : order_.object.stem().string()));
     heard_.folder = fs::absolute(order_.out.empty() ? fs::path(stem_ + "-sound") : order_.out);
-    if (order_.materials.empty()) {
-      materials_ = {kDefaultMaterial};
-      heard_.assumed.push_back(fmt::format(
-          "material: {} (none given); choose another with --material NAME (`carillon materials` lists them)", kDefaultMaterial));
-    } else {
-      materials_ = order_.materials;
-    }
-    if (is_shape()) return;
+    materials_ = order_.materials;
+    if (!is_shape()) look_at_file();
+    if (!materials_.empty()) return;
+    materials_ = {kDefaultMaterial};
+    heard_.assumed.insert(heard_.assumed.begin(),
+                          fmt::format("material: {} (none given{}); choose another with --material NAME (`carillon materials` lists them)",
+                                      kDefaultMaterial, material_problem_.empty() ? "" : ", and " + material_problem_));
+  }
+
+  void look_at_file() {
     say("reading " + order_.object.filename().string());
     facts_.is_mesh = is_mesh();
     const std::string text = programs_.run("carillon-mesh", {fs::absolute(order_.object).string(), "--look"}, true);
@@ -217,13 +221,40 @@ class Listening {
     if (const long long unused = root.integer_if(is_mesh() ? "unused_nodes" : "unused_points", 0, kMaxUnused).value_or(0); unused > 0)
       heard_.assumed.push_back(fmt::format("unused: {} point{} of the file belong{} to no element and {} left out", unused,
                                            unused == 1 ? "" : "s", unused == 1 ? "s" : "", unused == 1 ? "is" : "are"));
-    if (is_mesh()) return;
+    if (is_mesh()) return look_at_model(root);
     facts_.triangles = root.integer("triangles", 0, std::numeric_limits<long long>::max());
     facts_.openings = root.integer("openings", 0, std::numeric_limits<long long>::max());
     facts_.thickness = root.has_number("thickness") ? root.number("thickness") : 0.0;
     if (!order_.wall_m && facts_.openings == 0)
       heard_.assumed.push_back(facts_.thickness > 0.0 ? std::string("body: a wall, since the file has both sides")
                                                       : std::string("body: solid; --wall T makes it a shell of T metres"));
+  }
+
+  /// Unit, material and supports of a mesh file.
+  void look_at_model(base::Object& root) {
+    if (root.has("unit")) {
+      facts_.unit_m = root.number("unit_m", base::kPositive);
+      facts_.unit = root.string("unit");
+    }
+    if (root.has("supports")) {
+      supports_ = root.string("supports");
+      heard_.assumed.push_back(
+          fmt::format("supports: the nodes of '{}' of the file are fixed; for a free body remove it from the file", supports_));
+    }
+    if (!root.has("materials") || !materials_.empty()) return;
+    base::Object materials = root.object("materials");
+    for (const std::string& region : materials.keys()) {
+      base::Object material = materials.object(region);
+      if (material.has("problem")) material_problem_ = "the file's cannot be used: " + material.string("problem");
+      of_file_.name = material.string("name");
+      of_file_.young_modulus_pa = material.number("young_modulus_pa");
+      of_file_.poisson_ratio = material.number("poisson_ratio");
+      of_file_.density_kg_m3 = material.number("density_kg_m3");
+    }
+    if (!material_problem_.empty()) return;
+    materials_ = {kOfFile};
+    heard_.assumed.push_back(fmt::format("material: of the file ({}{}); choose another with --material NAME", of_file_.name,
+                                         materials.keys().size() > 1 ? fmt::format(" and {} more", materials.keys().size() - 1) : ""));
   }
 
   std::vector<Wish> list_wishes() {
@@ -233,7 +264,7 @@ class Listening {
     const bool has_many_heights = heights.size() > 1;
     for (const std::string& name : materials_)
       for (const double height : heights) {
-        Wish wish{.material = &material::MaterialTable::get().find(name)->material, .height_m = height};
+        Wish wish{.material = name == kOfFile ? &of_file_ : &material::MaterialTable::get().find(name)->material, .height_m = height};
         wish.slowness = std::max(height, 1e-9) * std::sqrt(wish.material->density_kg_m3 / wish.material->young_modulus_pa);
         wish.name = fmt::format("{}-{}{}", stem_, clean(wish.material->name), has_many_heights ? fmt::format("-{:g}m", height) : "");
         if (!place_.emplace(wish.name, place_.size()).second) throw InputError(fmt::format("{} is given twice", wish.name));
@@ -317,7 +348,8 @@ class Listening {
       job.set("mesh", fs::absolute(order_.object).string()).set("mesh_scale", order_.scale.value_or(1.0));
     else
       job.set("mesh", make_mesh(wish).filename().string());
-    job.set("material", wish.material->name).set("bank", sound.bank.filename().string());
+    if (!supports_.empty()) job.set("fixed", supports_);
+    job.set("material", wish.material == &of_file_ ? kOfFile : wish.material->name).set("bank", sound.bank.filename().string());
     job.set("band_hz", base::Json::array(kBandHz)).set("max_modes", is_refining_ ? kMaxModes : job::kPreviewModes);
     const fs::path file = heard_.folder / (wish.name + ".json");
     base::write_file(file, job.text());
@@ -433,6 +465,9 @@ class Listening {
   std::string stem_;
   SurfaceFacts facts_;
   std::vector<std::string> materials_;
+  material::Material of_file_;                     // the last of the mesh file
+  std::string material_problem_;                   // why the file's are not used
+  std::string supports_;                           // node set of the mesh file
   std::map<double, fs::path> meshes_;              // by height
   std::vector<std::pair<Wish, fs::path>> solved_;  // with their banks
   std::map<std::string, std::size_t> place_;       // order of the sounds

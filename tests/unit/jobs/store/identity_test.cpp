@@ -104,6 +104,24 @@ TEST(Identity, changed_mesh_is_hashed_again) {
   EXPECT_NE(maker.make(job::read_job(job, job::BankKey::optional)).input_sha256, before);
 }
 
+TEST(Identity, included_files_count_and_are_copied) {
+  const Folder folder;
+  const auto file = folder.write("a.json", job_with("m.inp", ""));
+  folder.write("m.inp", "*INCLUDE, INPUT=parts/n.inc\n** end\n");
+  folder.write("parts/n.inc", "*NODE\n1, 0, 0, 0\n");
+  store::RequestMaker maker(kSolver);
+  const job::JobSpec job = job::read_job(file, job::BankKey::optional);
+  const store::Request request = maker.make(job);
+  const store::Store store = store::Store::open(folder / "store");
+  const store::JobOrder order(job);
+  EXPECT_EQ(store::prepare_work(store, {{&order, &request}}), std::vector<bool>{true});
+  const job::JobSpec inner = job::read_job(store.work_folder(store::require_id(request.id, "test")) / store::kJobFile);
+  EXPECT_EQ(tests::read_all(inner.mesh), "*NODE\n1, 0, 0, 0\n** end\n");
+  EXPECT_EQ(inner.mesh.extension(), ".inp");
+  folder.write("parts/n.inc", "*NODE\n1, 0, 0, 1\n");
+  EXPECT_NE(maker.make(job).id, request.id);
+}
+
 TEST(Identity, hashes_equal_sha256sum) {
   // printf abc | sha256sum, FIPS 180-4 appendix B.1; printf '' | sha256sum.
   EXPECT_EQ(store::hash_text("abc").text(), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");

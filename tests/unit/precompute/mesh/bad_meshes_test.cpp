@@ -42,7 +42,7 @@ std::vector<BadFile> bad_files() {
       {"empty", "a.msh", "", {"a.msh: the file is empty", "write the mesh again"}},
       {"blank", "a.msh", " \n\n", {"a.msh:1", "only blanks"}},
       {"unknown", "a.dat", "hello world\n", {"a.dat:1", "not a mesh file", "hello world", "Medit"}},
-      {"nastran", "a.bdf", "$ Created by Gmsh\nGRID,1\n", {"a.bdf:1", "not a mesh file", "Created by Gmsh", "Medit"}},
+      {"unknown_comment", "a.dat", "$ Created by Gmsh\nGRID,1\n", {"a.dat:1", "not a mesh file", "Created by Gmsh", "Medit"}},
       {"surface", "a.stl", "solid box\n", {"a surface", "carillon-mesh"}},
       {"legacy_vtk", "a.vtk", "# vtk DataFile Version 3.0\n", {"legacy VTK", ".vtu"}},
       {"missing_node",

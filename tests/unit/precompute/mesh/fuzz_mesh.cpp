@@ -9,7 +9,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace carillon::mesh;
   if (size == 0) return 0;
-  const auto format = static_cast<MeshFormat>(data[0] % 4);
+  const auto format = static_cast<MeshFormat>(data[0] % 7);
   try {
     TetMesh mesh = parse_mesh({reinterpret_cast<const std::byte*>(data) + 1, size - 1}, "fuzz", format);
     check_mesh(mesh);
