@@ -313,8 +313,8 @@ void CaeModel::convert_materials(TetMesh& mesh) {
     out.name = material.name;
     out.place = cursor_.find_place(material.place);
     out.problem = material.problem;
-    const auto object = [&](const std::string& text) {
-      if (out.problem.empty()) out.problem = fmt::format("{}: material '{}': {}", out.place, material.name, text);
+    const auto object = [&out](const std::string& text) {
+      if (out.problem.empty()) out.problem = fmt::format("{}: material '{}': {}", out.place, out.name, text);
     };
     if (!material.density) object("it has no density; add one, or name a material in the job");
     if (!material.young || !material.poisson) object("it has no isotropic elasticity; add it, or name a material in the job");
