@@ -279,6 +279,18 @@ base::Json make_nonlinear(const QuarticEnergy& energy) {
 
 }  // namespace
 
+namespace {
+
+/// Program or format that imported modes come from.
+std::string find_origin_program(const Bank& bank) {
+  const std::optional<base::Json> record = base::Json::parse(bank.provenance);
+  return record && record->is_object() && record->has("imported") && (*record)["imported"].is_string()
+             ? base::printable((*record)["imported"].as_string())
+             : "another program";
+}
+
+}  // namespace
+
 std::string format_info(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file, std::size_t mode_limit,
                         bool has_record) {
   const auto [major, minor] = read_version(file);
@@ -295,7 +307,7 @@ std::string format_info(const Bank& bank, std::span<const HeardMode> heard, cons
                       bank.shape_bytes);
   if (bank.packing) text += fmt::format("packed    {}\n", describe(*bank.packing));
   if (bank.element == "imported")
-    text += fmt::format("solve     none: imported modes of another program at {} points\n", bank.counts.nodes);
+    text += fmt::format("solve     none: imported from {}, accuracy unknown; {} points\n", find_origin_program(bank), bank.counts.nodes);
   else if (bank.element == "analytic")
     text += fmt::format("solve     none: known modes at {} points, {} rigid modes\n", bank.counts.nodes, bank.counts.rigid_modes);
   else

@@ -17,6 +17,7 @@
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
 #include "runtime/exchange/faust.hpp"
+#include "runtime/exchange/frd.hpp"
 #include "runtime/exchange/glb.hpp"
 #include "runtime/exchange/sofa.hpp"
 #include "runtime/material/table.hpp"
@@ -26,7 +27,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kMaxGlbBytes = 1ULL << 32;
+constexpr std::uint64_t kMaxGlbBytes = 1ULL << 32, kMaxFrdBytes = 1ULL << 36;
+
+bank::Bank import_frd(const ImportWishes& wishes, const material::Material* material, std::vector<std::string>& notes) {
+  if (material == nullptr)
+    throw InputError(
+        fmt::format("{}: results of CalculiX name no density and no damping; add --material NAME (`carillon materials` lists them)",
+                    wishes.file.string()));
+  if (wishes.model || wishes.is_plain) throw InputError("--model and --plain are for glTF files; leave them out");
+  const FrdReading reading{.material = material,
+                           .units = wishes.unit == "mm-t-s" ? FrdUnits::kMillimetre : FrdUnits::kMetre,
+                           .are_units_given = !wishes.unit.empty()};
+  return parse_frd(base::read_file(wishes.file, "file of results", kMaxFrdBytes), wishes.file.string(), reading, &notes);
+}
+
+bank::Bank import_glb(const ImportWishes& wishes, const material::Material* material, std::vector<std::string>& notes) {
+  if (!wishes.unit.empty()) throw InputError("--unit is for .frd files; glTF is in metres");
+  const GlbReading reading{.model = wishes.model, .ignores_extras = wishes.is_plain, .material = material};
+  return parse_glb(base::read_file(wishes.file, "GLB or glTF file", kMaxGlbBytes), wishes.file.string(), reading, &notes);
+}
 
 std::string find_format(const ExportWishes& wishes) {
   if (!wishes.format.empty()) return wishes.format;
@@ -159,13 +178,13 @@ void run_export(const ExportWishes& wishes) {
 }
 
 void run_import(const ImportWishes& wishes) {
-  check_other(wishes.glb, wishes.out);
-  GlbReading reading{.model = wishes.model, .ignores_extras = wishes.is_plain};
-  if (!wishes.material.empty()) reading.material = &material::MaterialTable::get().require("--material", wishes.material).material;
-  const std::string bytes = base::read_file(wishes.glb, "GLB or glTF file", kMaxGlbBytes);
+  check_other(wishes.file, wishes.out);
+  const material::Material* const material =
+      wishes.material.empty() ? nullptr : &material::MaterialTable::get().require("--material", wishes.material).material;
   std::vector<std::string> notes;
-  const bank::Bank bank = parse_glb(bytes, wishes.glb.string(), reading, &notes);
-  for (const std::string& note : notes) fmt::print(stderr, "carillon-bank: note: {}: {}\n", base::printable(wishes.glb.string()), note);
+  const bank::Bank bank =
+      base::find_extension(wishes.file) == ".frd" ? import_frd(wishes, material, notes) : import_glb(wishes, material, notes);
+  for (const std::string& note : notes) fmt::print(stderr, "carillon-bank: note: {}: {}\n", base::printable(wishes.file.string()), note);
   if (base::is_standard_output(wishes.out)) {
     base::check_standard_output("bank");
     base::write_standard_output(bank::make_bank_bytes(bank));

@@ -1,7 +1,7 @@
 // Method: files with Carillon's extras: arrays from the extras, triangles and shapes from the extension, assembled as for a bank file
 //   (bank::assemble_bank); values present in both must agree. Other programs' files: lambda = (2 pi f)^2 + d^2, shapes rounded to 16 bits,
 //   mass properties by the divergence theorem if the model has none.
-// Source: KHR_audio_rigid_bodies, draft of 2026 (K. Hiner); integrals over a polyhedron: Tonon 2004.
+// Source: KHR_audio_rigid_bodies, draft of 2026 (K. Hiner).
 // Deviations: the node's scale applies to the body, and to modes and mass given for the unscaled body; its rotation and translation are
 //   ignored.
 #include <fmt/format.h>
@@ -31,6 +31,7 @@
 #include "runtime/exchange/glb.hpp"
 #include "runtime/exchange/gltf/file.hpp"
 #include "runtime/exchange/gltf/nodes.hpp"
+#include "runtime/exchange/solid.hpp"
 
 namespace carillon::exchange {
 namespace {
@@ -315,34 +316,6 @@ class Reader {
     return *high;
   }
 
-  struct Solid {
-    double volume_m3 = 0.0;
-    Vec3 centre_m{};
-    std::array<double, 9> inertia_m5{};  // unit density, about the centre
-  };
-
-  /// Volume integrals of a closed surface.
-  static Solid calc_solid(const bank::Bank& bank) {
-    Solid solid;
-    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();  // integral of x x^T
-    Eigen::Vector3d first = Eigen::Vector3d::Zero();
-    for (const auto& triangle : bank.triangles) {
-      Eigen::Matrix3d p;
-      for (int c = 0; c < 3; ++c) p.col(c) = Eigen::Map<const Eigen::Vector3d>(bank.vertices_m[triangle[c]].data());
-      const double part = p.determinant() / 6.0;  // tetrahedron with the origin
-      const Eigen::Vector3d sum = p.rowwise().sum();
-      solid.volume_m3 += part;
-      first += part / 4.0 * sum;
-      second += part / 20.0 * (sum * sum.transpose() + p * p.transpose());
-    }
-    const Eigen::Vector3d centre = first / solid.volume_m3;
-    const Eigen::Matrix3d about = second - solid.volume_m3 * centre * centre.transpose();
-    const Eigen::Matrix3d inertia = about.trace() * Eigen::Matrix3d::Identity() - about;
-    for (std::size_t c = 0; c < 3; ++c) solid.centre_m[c] = centre[static_cast<int>(c)];
-    for (std::size_t i = 0; i < 9; ++i) solid.inertia_m5[i] = inertia(static_cast<int>(i / 3), static_cast<int>(i % 3));
-    return solid;
-  }
-
   bank::Material read_material(base::Object& extension, base::Object& model) {
     bank::Material material;
     if (reading_->material != nullptr) {
@@ -412,7 +385,7 @@ class Reader {
 
   /// Mass properties of the model, or of its surface filled with the material.
   void read_mass(base::Object& model, double scale, bank::Bank& bank) {
-    const Solid solid = calc_solid(bank);
+    const Solid solid = calc_solid(bank.vertices_m, bank.triangles);
     if (!(solid.volume_m3 > 0.0))
       model.fail("indices", "its triangles enclose no volume or face inward; a bank needs a closed surface that faces outward");
     bank.rigid.volume_m3 = solid.volume_m3;
@@ -463,7 +436,8 @@ class Reader {
     for (const std::int32_t v : used_) bank.vertices_m.push_back(model_.positions[v]);
     bank.triangles = model_.triangles;
     bank.material = read_material(extension, model);
-    const bool is_of_unscaled_body = is_of_unscaled(model, node_scale, calc_solid(bank).volume_m3, bank.material.density_kg_m3);
+    const bool is_of_unscaled_body =
+        is_of_unscaled(model, node_scale, calc_solid(bank.vertices_m, bank.triangles).volume_m3, bank.material.density_kg_m3);
     const double scale = is_of_unscaled_body ? 1.0 : node_scale;
     for (Vec3& p : bank.vertices_m) p = scale * p;
     std::vector<double> lambda(modes);

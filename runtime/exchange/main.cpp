@@ -33,6 +33,7 @@
 #include "runtime/base/version.hpp"
 #include "runtime/base/whole_range.hpp"
 #include "runtime/exchange/commands.hpp"
+#include "runtime/exchange/compare.hpp"
 #include "runtime/material/solids.hpp"
 #include "runtime/material/table.hpp"
 
@@ -41,6 +42,7 @@ namespace {
 using namespace carillon;
 
 constexpr int kMost = std::numeric_limits<int>::max();
+constexpr int kMostCompared = 2000;
 const CLI::Validator kCounts(base::whole_range(1, kMost), base::describe_whole_range(1, kMost));
 
 /// Prints all checks, then throws InputError if there was a fault. `original`: source of a packed bank, or empty.
@@ -227,11 +229,13 @@ void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
 }
 
 void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
-  app.add_option("GLB", wishes.glb, "GLB or glTF file (.glb, .gltf with its buffers)")->required();
+  app.add_option("FILE", wishes.file, "GLB or glTF file (.glb, .gltf with its buffers), or modes of CalculiX (.frd)")->required();
   app.add_option("-o,--output", wishes.out, "Output bank; -: standard output")->required();
   app.add_option("--model", wishes.model, "Index of the modal model in the file, from 0")
       ->check(base::whole_range(0, kMost), base::describe_whole_range(0, kMost));
-  app.add_option("--material", wishes.material, "Material name (carillon materials) for a model without one");
+  app.add_option("--material", wishes.material, "Material name (carillon materials) for a model without one, and for .frd");
+  app.add_option("--unit", wishes.unit, "Units of a .frd file, m-kg-s or mm-t-s; default: the former, for bodies of at most 10 m")
+      ->check(CLI::IsMember({"m-kg-s", "mm-t-s"}));
   app.add_flag("--plain", wishes.is_plain, "Read only the extension, ignoring the extras of carillon-bank export");
 }
 
@@ -292,9 +296,9 @@ void unpack(const std::string& file, const std::string& out) {
 
 /// Options of all commands.
 struct Options {
-  std::string file, original, packed, unpacked, edited;
+  std::string file, original, packed, unpacked, edited, second, picture;
   bool json = false, csv = false, all = false, keep_numbers = false;
-  std::size_t modes = 20;
+  std::size_t modes = 20, compared_modes = 50;
   double error_db = bank::kPackError;
   Wishes wishes;
   exchange::ExportWishes exported;
@@ -312,6 +316,13 @@ void add_commands(CLI::App& app, Options& options) {
   info->add_flag("--csv", options.csv, "Modes only, as CSV")->excludes(as_json);
   info->add_flag("--all", options.all, "Add the record of the run: versions, seconds, memory, partition, solver");
   info->add_option("--modes", options.modes, "Rows of the mode table")->capture_default_str();
+  CLI::App* comparison = add("compare", "Compares the modes of two banks of a body: pairs, cents, shapes (MAC), levels", "First bank");
+  comparison->add_option("SECOND", options.second, "Second bank")->required();
+  comparison->add_option("--modes", options.compared_modes, "Lowest modes of each that are compared")
+      ->check(base::whole_range(1, kMostCompared), base::describe_whole_range(1, kMostCompared))
+      ->capture_default_str();
+  comparison->add_flag("--json", options.json, "As JSON, with the whole MAC");
+  comparison->add_option("--picture", options.picture, "Write the MAC as a picture to this file (.svg)");
   add("check", "Checks a bank, one line per property; exit code 0 if valid, else 2")
       ->add_option("--original", options.original, "Original of a packed bank, to measure its error again");
   CLI::App* pack = add("pack", "Compresses a bank with a stated error, for web pages and games");
@@ -333,8 +344,22 @@ void add_commands(CLI::App& app, Options& options) {
           "export",
           "Exports to GLB (mesh and modes, KHR_audio_rigid_bodies), Faust (the loudest modes at a few points) or SOFA (directivity)"),
       options.exported);
-  add_import(*app.add_subcommand("import", "Imports a GLB or glTF file with KHR_audio_rigid_bodies as a bank; lossless for exported files"),
-             options.imported);
+  add_import(
+      *app.add_subcommand(
+          "import",
+          "Imports a GLB or glTF file with KHR_audio_rigid_bodies as a bank, lossless for exported files; or modes of CalculiX (.frd)"),
+      options.imported);
+}
+
+void run_compare(const Options& options) {
+  const bank::Bank first = bank::read_bank(options.file), second = bank::read_bank(options.second);
+  const exchange::Comparison found = exchange::compare(first, second, options.compared_modes, options.second);
+  if (!options.picture.empty()) {
+    if (base::find_extension(options.picture) != ".svg")
+      throw InputError(fmt::format("--picture {}: the picture is SVG; give it a name that ends in .svg", options.picture));
+    base::write_file(options.picture, exchange::format_picture(found, base::printable(options.file), base::printable(options.second)));
+  }
+  fmt::print("{}", options.json ? exchange::format_json(found, first, second) : exchange::format_table(found, first, second));
 }
 
 void show(const Options& options) {
@@ -361,6 +386,7 @@ int run(int argc, char** argv) {
   }
   const std::string command = app.get_subcommands().front()->get_name();
   if (command == "info") show(options);
+  if (command == "compare") run_compare(options);
   if (command == "check") check(options.file, options.original);
   if (command == "pack") pack(options.file, options.packed, options.error_db, options.keep_numbers);
   if (command == "unpack") unpack(options.file, options.unpacked);

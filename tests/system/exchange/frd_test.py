@@ -1,0 +1,172 @@
+#!/usr/bin/python3
+"""Modes of CalculiX as a bank: a bar by ccx, imported, against our own solve of the same mesh: frequencies within 0.5 cents, the rendered
+level within 0.01 dB; one bank from metres and from millimetres; damaged and cut files are named.
+
+usage: frd_test.py BIN_DIR
+"""
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import h5py
+import meshio
+import numpy
+
+BIN = pathlib.Path(sys.argv[1]).resolve()
+YOUNG, POISSON, DENSITY = 210e9, 0.3, 7850.0
+MODES = 10
+
+
+def run(folder, *words, code=0):
+    done = subprocess.run(list(map(str, words)), cwd=folder, capture_output=True, text=True, timeout=200)
+    assert done.returncode == code, f"{words}: exit code {done.returncode}: {done.stdout[-2000:]}{done.stderr[-2000:]}"
+    return done.stdout + done.stderr
+
+
+def solve_ccx(folder, name, nodes, tets, length, stiffness, density):
+    text = "*NODE\n" + "".join(f"{i}, {x:.12g}, {y:.12g}, {z:.12g}\n" for i, (x, y, z) in enumerate(length * nodes, 1))
+    text += "*ELEMENT, TYPE=C3D10, ELSET=Body\n"
+    for i, t in enumerate(tets + 1, 1):
+        text += f"{i}, " + ", ".join(map(str, t[:7])) + ",\n" + ", ".join(map(str, t[7:])) + "\n"
+    text += f"*MATERIAL, NAME=STEEL\n*ELASTIC\n{YOUNG * stiffness:.9g}, {POISSON}\n*DENSITY\n{DENSITY * density:.9g}\n"
+    text += f"*SOLID SECTION, ELSET=Body, MATERIAL=STEEL\n*STEP\n*FREQUENCY\n{MODES + 6}\n*NODE FILE\nU\n*END STEP\n"
+    (folder / f"{name}.inp").write_text(text)
+    done = subprocess.run(
+        ["ccx", name], cwd=folder, capture_output=True, text=True, timeout=200, env={"PATH": "/usr/bin:/bin", "OMP_NUM_THREADS": "1"}
+    )
+    assert done.returncode == 0 and "*ERROR" not in done.stdout, done.stdout[-2000:]
+
+
+def read_bank(path):
+    with h5py.File(path) as bank:
+        modes = bank["modes"]
+        return modes["frequency_hz"][:], modes["shape"][:] * modes["shape_scale"][:][None, :, None], bank["mesh/vertices"][:]
+
+
+def measure_levels(folder, bank, freq_hz):
+    """Level of each mode in the sound of a strike [dB], with a Hann window over the last two seconds."""
+    scene = {
+        "duration_s": 2.2,
+        "sample_rate_hz": 48000,
+        "bodies": [{"name": "bar", "bank": bank, "fixed": True}],
+        "strikes": [
+            {"time_s": 0.05, "body": "bar", "point_m": [0.1, 0.01, 0.005], "impulse_n_s": [0.01, -0.02, -0.03], "duration_s": 0.0001}
+        ],
+        "listener": {"position_m": [0.3, -0.8, 0.4]},
+        "frequencies": "mesh",
+        "output": {"gain": 1e-3, "format": "float"},
+    }
+    (folder / "scene.json").write_text(json.dumps(scene))
+    run(folder, BIN / "carillon-render", "scene.json", "-q", "-o", "out.wav")
+    data = (folder / "out.wav").read_bytes()
+    channels = int.from_bytes(data[22:24], "little")
+    sound = numpy.frombuffer(data[data.index(b"data") + 8 :], "<f4").astype(float)[::channels][-96000:]
+    time = numpy.arange(len(sound)) / 48000
+    window = sound * numpy.hanning(len(sound))
+    return numpy.array([20 * math.log10(abs(window @ numpy.exp(-2j * math.pi * f * time))) for f in freq_hz])
+
+
+def check_comparison(folder):
+    """Pairs, MAC and levels against numpy, on the common vertices of the two banks."""
+    run(folder, BIN / "carillon-bank", "edit", "m.hdf", "fewer.hdf", "--modes", 4)
+    found = json.loads(run(folder, BIN / "carillon-bank", "compare", "own.hdf", "m.hdf", "--json", "--picture", "mac.svg"))
+    assert [(pair["first"], pair["second"]) for pair in found["pairs"]] == [(k, k) for k in range(MODES)], found["pairs"]
+    own, other = read_bank(folder / "own.hdf"), read_bank(folder / "m.hdf")
+    at = [int(numpy.abs(other[2] - v).max(axis=1).argmin()) for v in own[2]]
+    for k, pair in enumerate(found["pairs"]):
+        a, b = own[1][:, k].ravel(), other[1][at, k].ravel()
+        mac = (a @ b) ** 2 / ((a @ a) * (b @ b))
+        assert pair["mac"] > 0.999999 and mac > 0.999999 and abs(pair["level_db"]) < 0.01, pair
+        assert abs(pair["cents"] - 1200 * math.log2(other[0][k] / own[0][k])) < 1e-9, pair
+    mac = numpy.array(found["mac"])
+    assert mac.shape == (MODES, MODES) and (mac - numpy.diag(mac.diagonal())).max() < 0.5
+    picture = (folder / "mac.svg").read_text()
+    assert picture.startswith("<svg") and picture.count("#c03020") == MODES
+    said = run(folder, BIN / "carillon-bank", "compare", "own.hdf", "fewer.hdf")
+    assert "4 pairs" in said and said.count("has no partner") == MODES - 4, said
+    run(folder, BIN / "carillon-bank", "edit", "m.hdf", "twice.hdf", "--size", 2)
+    said = run(folder, BIN / "carillon-bank", "compare", "own.hdf", "twice.hdf", code=2)
+    assert "twice.hdf" in said and "same size" in said, said
+
+
+def check_refusals(folder):
+    text = (folder / "m.frd").read_bytes()
+    said = run(folder, BIN / "carillon-bank", "import", "m.frd", "-o", "x.hdf", code=2)
+    assert "--material" in said, said
+    said = run(folder, BIN / "carillon-bank", "import", "mm.frd", "--material", "steel", "-o", "x.hdf", code=2)
+    assert "--unit mm-t-s" in said, said
+    first = text.index(b" -4  DISP")
+    damages = {
+        "no_modes": (text[: text.index(b"    1PSTEP")] + b" 9999\n", "no modes"),
+        "word": (text.replace(b" -1         2 ", b" -1       two ", 1), "word.frd:"),
+        "hexahedron": (text.replace(b" -1         1    6", b" -1         1    1", 1), "only tetrahedra"),
+        "binary": (text.replace(text[text.index(b"    2C") : text.index(b"\n", text.index(b"    2C"))], b"    2C      10      2"), "ASCII"),
+        "lost_node": (text[:first] + text[first:].replace(b" -1         2 ", b" -1    999999 ", 1), "node 999999"),
+    }
+    for name, (data, words) in damages.items():
+        (folder / f"{name}.frd").write_bytes(data)
+        said = run(folder, BIN / "carillon-bank", "import", f"{name}.frd", "--material", "steel", "-o", "x.hdf", code=2)
+        assert words in said and f"{name}.frd" in said, f"{name}: {said}"
+    for cut in range(1, len(text) - 6, len(text) // 40):
+        (folder / "cut.frd").write_bytes(text[:cut])
+        said = run(folder, BIN / "carillon-bank", "import", "cut.frd", "--material", "steel", "-o", "x.hdf", code=2)
+        assert "cut.frd:" in said, f"{cut}: {said}"
+    assert not (folder / "x.hdf").exists()
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        run(
+            folder,
+            BIN / "carillon-mesh",
+            *"--shape bar --length 0.2 --width 0.02 --thickness 0.01 --nodes 900 --order 2 -q -o bar.msh".split(),
+        )
+        mesh = meshio.read(folder / "bar.msh")
+        nodes, tets = mesh.points, numpy.vstack([block.data for block in mesh.cells if block.type == "tetra10"])
+        solve_ccx(folder, "m", nodes, tets, 1, 1, 1)
+        solve_ccx(folder, "mm", nodes, tets, 1e3, 1e-6, 1e-12)
+        material = {
+            "young_modulus_pa": YOUNG,
+            "poisson_ratio": POISSON,
+            "density_kg_m3": DENSITY,
+            "damping": {"rayleigh": {"alpha2_per_s": 3}},
+        }
+        (folder / "steel.json").write_text(json.dumps({"materials": [{"name": "ccx steel", "group": "metal", **material}]}))
+
+        os.environ["CARILLON_MATERIALS"] = str(folder / "steel.json")
+        job = {
+            "mesh": "bar.msh",
+            "material": "ccx steel",
+            "bank": "own.hdf",
+            "max_modes": MODES,
+            "shapes": "exact",
+            "band_hz": [20, 100000],
+        }
+        (folder / "own.json").write_text(json.dumps(job))
+        run(folder, BIN / "carillon-precompute", "-q", "own.json")
+        run(folder, BIN / "carillon-bank", "import", "m.frd", "--material", "ccx steel", "-o", "m.hdf")
+        run(folder, BIN / "carillon-bank", "import", "mm.frd", "--material", "ccx steel", "--unit", "mm-t-s", "-o", "mm.hdf")
+        said = run(folder, BIN / "carillon-bank", "info", "m.hdf")
+        assert "imported from CalculiX 2.20, accuracy unknown" in said, said
+        run(folder, BIN / "carillon-bank", "check", "m.hdf")
+        own, metres, millimetres = (read_bank(folder / f"{name}.hdf") for name in ("own", "m", "mm"))
+        cents = 1200 * abs(numpy.log2(metres[0] / own[0])).max()
+        assert len(metres[0]) == MODES and cents < 0.5, cents
+        assert abs(metres[0] / millimetres[0] - 1).max() < 1e-6 and abs(metres[2] - millimetres[2]).max() < 1e-6
+        assert abs(abs(metres[1]) - abs(millimetres[1])).max() < 1e-3 * abs(metres[1]).max()
+        levels = measure_levels(folder, "own.hdf", own[0])
+        is_heard = levels > levels.max() - 60
+        for bank, modes in ("m.hdf", metres), ("mm.hdf", millimetres):
+            differ = abs(measure_levels(folder, bank, modes[0]) - levels)[is_heard]
+            assert is_heard.sum() >= 5 and differ.max() < 0.01, f"{bank}: {differ} dB"
+        print(f"{cents:.3f} cents, levels within {differ.max():.4f} dB")
+        check_comparison(folder)
+        check_refusals(folder)
+
+
+main()
