@@ -333,7 +333,7 @@ void InpReader::read_section(const Keyword& keyword) {
   skip_data();
 }
 
-/// The format has no end: what tells that a file was cut.
+/// The format has no end: signs of a file that was cut.
 void InpReader::check_end() {
   const std::string_view bytes = cursor_.bytes();
   if (!bytes.ends_with('\n'))
