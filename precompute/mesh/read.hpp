@@ -10,8 +10,8 @@
 //
 // Node sets by format (value 0 means "none" and makes no set; at most 1000 sets per array of values):
 //   Gmsh     every physical group of any dimension by its name, `physical:N` if unnamed; groups of equal names are merged
-//   VTU      every integer point-data array with one component: `NAME` (values other than 0) and, of arrays that
-//            hold more than 0 and 1, `NAME:N`
+//   VTU      every integer point-data array with one component: `NAME` (values other than 0) and `NAME:N`, which
+//            arrays of UInt8 that hold only 0 and 1 do not need
 //   Medit    `ref:N` from the vertices' references, `edges:N` and `triangles:N` (and `quads:N`) from those of the surface elements
 //   TetGen   `marker:N` from the boundary markers of the .node file
 //   .inp     every *NSET and *ELSET; `*BOUNDARY`: the nodes that it holds in x, y and z (also mesh.supports)

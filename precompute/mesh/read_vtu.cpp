@@ -8,6 +8,7 @@
 #include <cctype>
 #include <memory>
 #include <pugixml.hpp>
+#include <set>
 
 #include "precompute/mesh/build_mesh.hpp"
 #include "precompute/mesh/read.hpp"
@@ -95,6 +96,7 @@ class VtuReader {
   std::unique_ptr<VtuData> data_;
   RawMesh raw_;
   std::map<std::string, std::vector<std::int64_t>> point_values_;  // concatenated over pieces
+  std::set<std::string, std::less<>> numbered_;                    // arrays of these that are not UInt8
   std::vector<Vec3> doubt_m_;
 };
 
@@ -200,6 +202,7 @@ void VtuReader::read_point_sets(const Piece& piece, std::size_t first_node) {
     // These arrays are a convenience; hundreds of them are not node sets.
     if (++arrays > kMaxSetArrays || (point_values_.size() >= kMaxSetArrays && !point_values_.contains(name))) break;
     const auto values = read_array<std::int64_t>(array, piece.points);
+    if (array.attribute("type").as_string() != std::string_view("UInt8")) numbered_.insert(name);
     auto& all = point_values_[name];
     all.resize(first_node, 0);
     all.insert(all.end(), values.begin(), values.end());
@@ -292,7 +295,7 @@ TetMesh VtuReader::read() {
     for (std::size_t i = 0; i < values.size(); ++i)
       if (values[i] != 0) set.push_back(static_cast<std::int32_t>(i));
     const bool is_flag = std::all_of(values.begin(), values.end(), [](std::int64_t value) { return value == 0 || value == 1; });
-    if (!is_flag) add_value_sets(name, values, 0, mesh);
+    if (!is_flag || numbered_.contains(name)) add_value_sets(name, values, 0, mesh);
   }
   return mesh;
 }
