@@ -15,6 +15,7 @@
 #include "precompute/eigen/predict_cost.hpp"
 #include "precompute/eigen/proof.hpp"
 #include "precompute/eigen/timer.hpp"
+#include "precompute/la/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::eigen {
@@ -254,6 +255,32 @@ void Search::verify_found() const {
 void Search::complete(BandCounts& counts) {
   move_doubtful_counts(counts.limits);
   for (bool is_complete = search_gaps(); !is_complete || move_counts_to_band(counts); is_complete = true) verify_found();
+}
+
+BandCounts Search::continue_from(const Modes& known) {
+  BandCounts counts;
+  counts_ = &counts;
+  for (const Count& count : known.proof.counts)
+    counter_.restore({body_.scaling.to_scaled(std::pow(2 * std::numbers::pi * count.freq_hz, 2)), count.below});
+  const Inertia above = count_below_high(get_band_counter().count_below, body_.asked.high);
+  counts.limits = {body_.scaling.to_scaled(std::pow(2 * std::numbers::pi * known.proof.counts.front().freq_hz, 2)), body_.asked.high};
+  counts.band = {counts.limits.low, known.count_below_low, above.lambda, above.below};
+  counts.limits.low = std::max(counts.limits.low, body_.asked.low);
+  counts.count_below_low = known.count_below_low;
+  counts.mechanism_count = known.mechanism_count;
+  counts.band_count = counts.band.count();
+  searched_to_ = above.lambda;
+  check_memory(body_.comm, calc_search_bytes(body_.rows, counts.band_count, body_.rigid_count()), body_.options.memory_limit_bytes,
+               fmt::format("The search for {} modes", counts.band_count));
+  found_.reset(body_.problem.stiffness, petsc::to_petsc_int(counts.band_count), body_.rigid);
+  const la::LocalColumns shapes(known.shapes);
+  std::vector<double> shape(shapes.rows);
+  for (std::size_t j = 0; j < known.lambda.size(); ++j) {
+    std::transform(shapes.column(static_cast<PetscInt>(j)), shapes.column(static_cast<PetscInt>(j)) + shapes.rows, shape.begin(),
+                   [factor = body_.scaling.get_shape_factor()](double value) { return value / factor; });
+    found_.add(body_.scaling.to_scaled(known.lambda[j]), shape.data());
+  }
+  return counts;
 }
 
 }  // namespace carillon::eigen

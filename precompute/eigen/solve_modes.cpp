@@ -187,6 +187,17 @@ bool is_mostly_wanted(const BandProblem& body, const BandCounts& counts) {
   return body.n <= kDenseRowsFull && static_cast<double>(last) > kDenseShare * body.n && is_dense_exact(body, counts.limits);
 }
 
+// Adds what the modes of the lower band took.
+void add_work(const Modes& known, Modes& modes) {
+  modes.factor.factorisations += known.factor.factorisations;
+  modes.factor.solves += known.factor.solves;
+  modes.proof.factor_backward_error = std::max(modes.proof.factor_backward_error, known.proof.factor_backward_error);
+  Seconds known_seconds = known.seconds;
+  const auto before = comm::list_numbers(known_seconds);
+  const auto seconds = comm::list_numbers(modes.seconds);
+  for (std::size_t i = 0; i < before.size(); ++i) seconds[i] += before[i];
+}
+
 /// Findings about the band so far, for messages and for the next stage.
 class Solve {
  public:
@@ -221,18 +232,19 @@ void Solve::solve_sparse_band() {
   report_(Phase::kAnalyse, 0);
   Search& search = search_.emplace(body_, report_, modes_.factor, modes_.seconds);
   report_(Phase::kCount, 0);
-  BandCounts counts = count_band(body_, search.get_band_counter());
+  const bool is_continued = body_.options.known != nullptr && !body_.options.known->lambda.empty();
+  BandCounts counts = is_continued ? search.continue_from(*body_.options.known) : count_band(body_, search.get_band_counter());
   limits = counts.limits;
   modes_.mechanism_count = counts.mechanism_count;
   report_.band_count = modes_.band_count = counts.band_count;
   modes_.count_below_low = counts.count_below_low;
   if (counts.band_count == 0) return describe_proof(body_, search, counts, {}, modes_);
-  if (is_mostly_wanted(body_, counts)) {
+  if (!is_continued && is_mostly_wanted(body_, counts)) {
     search_.reset();
     others_ = solve_dense_band(body_, limits, report_, modes_);
     return;
   }
-  search.run(counts);
+  if (!is_continued) search.run(counts);
   search.complete(counts);
   limits = counts.limits;
   modes_.mechanism_count = counts.mechanism_count;
@@ -272,6 +284,7 @@ Modes solve_modes(const Problem& problem, const Options& options) {
     }
   }
   comm.max(comm::list_numbers(modes.seconds));
+  if (options.known != nullptr) add_work(*options.known, modes);
   return modes;
 }
 

@@ -89,7 +89,6 @@ class Search {
   bool wants_layer() const;
   double predict_worst(bool keeps_geometry, double ratio) const;
   double find_ratio(double goal_cents, double min) const;
-  std::vector<std::size_t> find_listed(const error_bars::Corrections& corrections) const;
   double find_worst(const error_bars::Corrections& corrections) const;
   void compare_levels();
   Forecast forecast(const Setting& setting, double ratio) const;
@@ -123,15 +122,10 @@ std::vector<error_bars::Level> Search::list_coarser(const Trial& trial) const {
   return levels;
 }
 
-/// Modes of the bank.
-std::vector<std::size_t> Search::find_listed(const error_bars::Corrections& corrections) const {
-  return error_bars::find_lowest(corrections, static_cast<std::size_t>(run_.job.max_modes.value_or(std::numeric_limits<int>::max())));
-}
-
 /// The widest bar of these.
 double Search::find_worst(const error_bars::Corrections& corrections) const {
   double worst = 0.0;
-  for (const std::size_t m : find_listed(corrections)) worst = std::max(worst, corrections.cents[m]);
+  for (const std::size_t m : find_bank_modes(run_.job, corrections)) worst = std::max(worst, corrections.cents[m]);
   return worst;
 }
 
@@ -183,7 +177,8 @@ double Search::find_last_hz() const {
 /// No mode of the bank is rough or stiff.
 bool Search::are_reliable() const {
   const error_bars::Corrections& corrections = current_.solved.errors.bars.corrected;
-  return std::ranges::all_of(find_listed(corrections), [&](std::size_t m) { return bank::is_reliable(corrections.correction[m]); });
+  return std::ranges::all_of(find_bank_modes(run_.job, corrections),
+                             [&](std::size_t m) { return bank::is_reliable(corrections.correction[m]); });
 }
 
 /// One layer of T10 bends with a constant shear through the thickness, however fine it is in the plane, and leaves its traction on the
@@ -191,7 +186,7 @@ bool Search::are_reliable() const {
 bool Search::wants_layer() const {
   const error_bars::ErrorBars& bars = current_.solved.errors.bars;
   if (run_.job.body->shape.empty() || report_.trials.back().setting.layers > 1) return false;
-  const std::vector<std::size_t> listed = find_listed(bars.corrected);
+  const std::vector<std::size_t> listed = find_bank_modes(run_.job, bars.corrected);
   const auto widest =
       std::ranges::max_element(listed, {}, [&](std::size_t m) { return bars.algebraic_cents[m] + bars.corrected.cents[m]; });
   return widest != listed.end() && bars.level.parts[*widest].tractions > kLayered * bars.level.parts[*widest].interpolation;
@@ -363,7 +358,9 @@ Trial Search::judge(const Setting& setting, std::size_t first_phase) {
 /// Sets the widest bar of the last trial and its frequency.
 void Search::judge_bars(Trial& trial) const {
   const error_bars::ErrorBars& bars = current_.solved.errors.bars;
-  for (const std::size_t k : find_listed(bars.corrected)) {
+  const std::vector<std::size_t> listed = find_bank_modes(run_.job, bars.corrected);
+  trial.modes = listed.size();
+  for (const std::size_t k : listed) {
     const double cents = bars.algebraic_cents[k] + bars.corrected.cents[k];
     trial.algebraic_cents = std::max(trial.algebraic_cents, bars.algebraic_cents[k]);
     if (!bars.corrected.facet_cents.empty()) trial.facet_cents = std::max(trial.facet_cents, bars.corrected.facet_cents[k]);

@@ -1,6 +1,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <limits>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -202,6 +204,15 @@ std::string describe_scale_key(const job::JobSpec& job) {
 std::optional<std::int64_t> find_computed_count(const job::JobSpec& job) {
   if (!job.max_modes) return std::nullopt;
   return static_cast<std::int64_t>(error_bars::find_computed_count(static_cast<std::size_t>(*job.max_modes)));
+}
+
+std::vector<std::size_t> find_bank_modes(const job::JobSpec& job, const error_bars::Corrections& corrections) {
+  constexpr double kEdge = 1e-9;  // as of the eigensolver's band
+  const double omega = 2 * std::numbers::pi * job.band_hz[1];
+  std::vector<std::size_t> modes =
+      error_bars::find_lowest(corrections, static_cast<std::size_t>(job.max_modes.value_or(std::numeric_limits<int>::max())));
+  std::erase_if(modes, [&](std::size_t m) { return corrections.lambda[m] > omega * omega * (1 + kEdge); });
+  return modes;
 }
 
 namespace {

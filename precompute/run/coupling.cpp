@@ -10,25 +10,12 @@
 #include "precompute/fem/assemble.hpp"
 #include "precompute/run/stages.hpp"
 #include "runtime/bank/surface.hpp"
-#include "runtime/base/sort_order.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::run {
 namespace {
 
 static_assert(job::kMaxCoupledModes == coupling::kMaxModes && static_cast<std::size_t>(coupling::kMaxModes) <= bank::kMaxCoupledModes);
-
-/// Mode numbers of the bank, ascending, as bank::keep_lowest() selects them: the lowest corrected frequencies.
-std::vector<std::int32_t> find_kept_modes(const Run& run, const SolvedBody& solved) {
-  std::vector<double> freq_hz;
-  for (const double lambda : solved.errors.bars.corrected.lambda) freq_hz.push_back(std::sqrt(lambda) / (2 * std::numbers::pi));
-  if (freq_hz.empty()) freq_hz = solved.modes.lambda;
-  std::vector<std::int32_t> kept;
-  for (const std::size_t mode : base::find_sort_order(freq_hz)) kept.push_back(static_cast<std::int32_t>(mode));
-  if (run.job.max_modes) kept.resize(std::min<std::size_t>(kept.size(), *run.job.max_modes));
-  std::sort(kept.begin(), kept.end());
-  return kept;
-}
 
 coupling::CondenseOptions make_condense_options(Run& run, const Solution& found, std::vector<std::int32_t> kept) {
   coupling::CondenseOptions options;
@@ -86,7 +73,8 @@ CouplingReport couple_modes(Run& run, const Solution& found) {
   if (!run.job.nonlinear) return report;
   run.log.begin("coupling", fmt::format("quartic energy of {} modes below {:g} Hz", run.job.nonlinear->modes, run.job.nonlinear->below_hz));
   const SolvedBody& solved = found.solved;
-  const std::vector<std::int32_t> kept = find_kept_modes(run, solved);
+  std::vector<std::int32_t> kept;
+  for (const std::size_t mode : find_bank_modes(run.job, solved.errors.bars.corrected)) kept.push_back(static_cast<std::int32_t>(mode));
   const coupling::CondenseOptions options = make_condense_options(run, found, kept);
   coupling::Condensed result = name_errors(found.body.source, run, [&] {
     if (solved.modes.lambda.empty()) throw InputError("\"nonlinear\" couples modes, and there are none in the band: widen \"band_hz\"");

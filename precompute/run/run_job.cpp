@@ -174,11 +174,14 @@ bank::Bank make_bank(const job::JobSpec& job, Solution& found, io::SurfaceModes&
   bank.proof = make_proof(modes);
   bank.counts = {body.pieces.nodes, body.pieces.tets, body.pieces.components, modes.rigid_count};
   bank.band_hz = {find_low_hz(job, modes), job.band_hz[1]};
-  bank.complete = modes.band_count == static_cast<std::int64_t>(modes.lambda.size());
+  const error_bars::Corrections& corrected = solved.errors.bars.corrected;
+  bank.complete = modes.band_count == static_cast<std::int64_t>(modes.lambda.size()) &&
+                  (corrected.lambda.empty() || std::sqrt(corrected.stated_above) >= 2 * std::numbers::pi * job.band_hz[1]);
   bank.element = job::to_text(found.setting.element);
   bank.mass = job::to_text(job.mass);
   if (!derivatives.parameters.empty())
     bank.sensitivities = make_sensitivities(solved.properties.materials.list.front(), body, solved.errors.bars, bank, derivatives);
+  bank::keep_band(bank);
   if (job.max_modes) bank::keep_lowest(bank, static_cast<std::size_t>(*job.max_modes));
   return bank;
 }
@@ -288,19 +291,44 @@ void write_bank(Run& run, const bank::Bank& bank) {
 
 namespace {
 
-/// Modes that may be on either side of the upper end of the band, and where modes of the body may be missing; empty: neither.
+/// "3", "3, 4 and 7", "3, 4, 7 and 12 more"
+std::string list_numbers(const std::vector<std::size_t>& numbers) {
+  constexpr std::size_t kMost = 8;
+  const std::size_t named = numbers.size() > kMost ? kMost : numbers.size() - 1;
+  const std::string rest = numbers.size() > kMost ? fmt::format("{} more", numbers.size() - named) : fmt::format("{}", numbers.back());
+  return named == 0
+             ? rest
+             : fmt::format("{} and {}", fmt::join(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(named), ", "), rest);
+}
+
+/// Modes of the bank and modes left out that may lie on the other side of an end of the band, and where modes of the body may be missing;
+/// empty: none.
 std::string describe_end(const job::JobSpec& job, const bank::Bank& bank, const error_bars::Corrections& corrected) {
-  if (!bank.complete || corrected.lambda.empty()) return {};
-  const double high_hz = job.band_hz[1], complete_hz = std::sqrt(corrected.complete_below) / (2 * std::numbers::pi);
-  int near = 0;
-  for (std::size_t m = 0; m < bank.mode_count(); ++m)
-    near += std::abs(1200 * std::log2(bank.corrected.freq_hz[m] / high_hz)) <= bank.corrected.error_cents[m] ? 1 : 0;
-  std::string text;
-  if (near > 0)
-    text = fmt::format("{} mode{} may lie on either side of the band's end at {:g} Hz, within {} error bar{}", near, near == 1 ? "" : "s",
-                       high_hz, near == 1 ? "its" : "their", near == 1 ? "" : "s");
-  if (complete_hz < high_hz) text += fmt::format("{}modes above {:.4g} Hz may be missing", text.empty() ? "" : "; ", complete_hz);
-  return text;
+  if (corrected.lambda.empty()) return {};
+  const auto to_hz = [](double lambda) { return std::sqrt(lambda) / (2 * std::numbers::pi); };
+  std::vector<std::string> parts;
+  for (const double end_hz : job.band_hz) {
+    const auto is_near = [&](double hz, double cents) { return std::abs(1200 * std::log2(hz / end_hz)) <= cents; };
+    std::vector<std::size_t> near;
+    for (std::size_t m = 0; m < bank.mode_count(); ++m)
+      if (is_near(bank.corrected.freq_hz[m], bank.corrected.error_cents[m])) near.push_back(m + 1);
+    if (!near.empty())
+      parts.push_back(fmt::format("mode{} {} may lie on either side of the band's end at {:g} Hz, within {} error bar{}",
+                                  near.size() == 1 ? "" : "s", list_numbers(near), end_hz, near.size() == 1 ? "its" : "their",
+                                  near.size() == 1 ? "" : "s"));
+  }
+  if (!bank.complete && job.max_modes) return fmt::format("{}", fmt::join(parts, "; "));
+  const double high_hz = job.band_hz[1];
+  std::vector<double> left_hz;
+  for (std::size_t m = 0; m < corrected.lambda.size(); ++m)
+    if (const double hz = to_hz(corrected.lambda[m]); hz > high_hz && 1200 * std::log2(hz / high_hz) <= corrected.cents[m])
+      left_hz.push_back(hz);
+  if (!left_hz.empty())
+    parts.push_back(fmt::format("{} mode{} left out, from {:.2f} Hz on, may lie below it", left_hz.size(), left_hz.size() == 1 ? "" : "s",
+                                *std::ranges::min_element(left_hz)));
+  if (const double complete_hz = to_hz(corrected.complete_below); complete_hz < high_hz)
+    parts.push_back(fmt::format("modes above {:.4g} Hz may be missing", complete_hz));
+  return fmt::format("{}", fmt::join(parts, "; "));
 }
 
 /// The record in the bank is made before the bank is written; <bank>.resolved.json includes the time of writing.

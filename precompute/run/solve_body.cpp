@@ -13,17 +13,35 @@
 namespace carillon::run {
 namespace {
 
-error_bars::ErrorBars calc_bars(Run& run, const Body& body, const AssembledSystem& system, const eigen::Modes& modes) {
+error_bars::ErrorBars calc_bars(const Run& run, const Body& body, const AssembledSystem& system, const error_bars::Solution& solution) {
   const fem::Materials& materials = system.properties.materials;
   std::vector<error_bars::Solid> solids;
   for (const material::Material& material : materials.list) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
+  return error_bars::calc_error_bars(run.comm, body.pieces.local, system.matrices.stiffness, system.matrices.mass, solids, materials.of_tet,
+                                     run.job.mass, solution);
+}
+
+error_bars::Solution describe(const Run& run, const eigen::Modes& modes) {
   const bool is_cut = modes.band_count > static_cast<std::int64_t>(modes.lambda.size());
   const double last_hz = modes.lambda.empty() ? 0.0 : std::sqrt(modes.lambda.back()) / (2 * std::numbers::pi);
   error_bars::Solution solution{modes.lambda, modes.residual, modes.shapes, find_low_hz(run.job, modes),
-                                is_cut ? last_hz : run.job.band_hz[1]};
+                                is_cut || modes.proof.counts.empty() ? last_hz : modes.proof.counts.back().freq_hz};
   solution.below = std::max<std::int64_t>(0, modes.count_below_low - modes.rigid_count - modes.mechanism_count);
-  return error_bars::calc_error_bars(run.comm, body.pieces.local, system.matrices.stiffness, system.matrices.mass, solids, materials.of_tet,
-                                     run.job.mass, solution);
+  return solution;
+}
+
+/// Upper end of the mesh's band [Hz] beyond which no corrected frequency lies in the job's, predicted from the modes near its present end;
+/// 0 if it is there already, or the job takes only some of the modes. It includes what error bars reach, unless they are long.
+double find_wider_end(const Run& run, const eigen::Modes& modes, const error_bars::Corrections& corrected) {
+  constexpr double kGrowth = 1.1, kBeyond = 50.0, kMost = 1700.0;  // of corrections towards higher modes; cents: for bars, and in all
+  if (modes.lambda.empty() || modes.band_count > std::ssize(modes.lambda)) return 0.0;
+  const double high_hz = run.job.band_hz[1], solved_hz = modes.proof.counts.back().freq_hz;
+  const auto calc_cents = [&](double lambda) { return 1200 * std::log2(solved_hz / (std::sqrt(lambda) / (2 * std::numbers::pi))); };
+  const double stated = calc_cents(corrected.stated_above), reach = calc_cents(corrected.complete_below);
+  if (1200 * std::log2(solved_hz / high_hz) >= stated) return 0.0;
+  const double cents = std::min(kGrowth * std::min(reach, stated + kBeyond), kMost);
+  const double end_hz = high_hz * std::exp2(std::ceil(cents) / 1200);  // whole cents: the same on any number of ranks
+  return end_hz > solved_hz ? end_hz : 0.0;
 }
 
 /// Collective. Throws on every rank: SolveError, SystemError, naming the body and the job.
@@ -36,7 +54,7 @@ ModeProperties calc_errors(Run& run, const Body& body, const AssembledSystem& sy
   errors.decay_per_s = std::move(decay.decay_per_s);
   errors.shares = std::move(decay.shares);
   errors.supports = fem::calc_supports(run.comm, mesh, materials, run.job.mass, modes.lambda, modes.shapes);
-  errors.bars = name_errors(body.source, run, [&] { return calc_bars(run, body, system, modes); });
+  errors.bars = name_errors(body.source, run, [&] { return calc_bars(run, body, system, describe(run, modes)); });
   if (errors.bars.level.is_guessed)
     run.log.warn_once(
         "some faces of the mesh are one element wide and meet at 50 to 80 degrees: they may be planes of the body or a coarse round "
@@ -77,9 +95,15 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   write_matrices(run, body, system);
   begin_checkpoint(run, setting, body);
   SolvedBody solved;
-  solved.modes = find_modes(run, setting, body, system);
+  const eigen::Problem problem{system.matrices.stiffness, system.matrices.mass, make_layout(body)};
+  solved.modes = find_modes(run, setting, body, problem);
   save_if_requested(run, solved.modes);
   solved.errors = calc_errors(run, body, system, solved.modes);
+  for (double end_hz = 0.0; (end_hz = find_wider_end(run, solved.modes, solved.errors.bars.corrected)) > 0.0;) {
+    solved.modes = find_more_modes(run, setting, body, problem, end_hz, solved.modes);
+    solved.errors = calc_errors(run, body, system, solved.modes);
+  }
+  if (find_bank_modes(run.job, solved.errors.bars.corrected).empty()) run.log.warn("no mode in the band: the bank will be silent");
   save_if_requested(run, solved.modes, has_later_stages(run.job));  // later stages may take longer than the modes
   if (run.checkpoint) run.checkpoint->end();
   solved.properties = std::move(system.properties);

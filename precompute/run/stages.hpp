@@ -105,6 +105,9 @@ std::string describe_scale_key(const job::JobSpec& job);
 /// Number of modes to compute: more than `max_modes`, so that the lowest corrected ones are reliable; nullopt: all of the band.
 std::optional<std::int64_t> find_computed_count(const job::JobSpec& job);
 
+/// Modes of the bank, ascending: those whose corrected frequency is not above the job's band, the lowest `max_modes` of them.
+std::vector<std::size_t> find_bank_modes(const job::JobSpec& job, const error_bars::Corrections& corrections);
+
 /// Rank 0.
 cost::ProblemSize find_problem_size(const Run& run, const Setting& setting, const Body& body);
 
@@ -130,10 +133,14 @@ double find_low_hz(const job::JobSpec& job, const eigen::Modes& modes);
 /// Positions and components of the free nodes; moves the elimination order out of the body.
 eigen::NodeLayout make_layout(Body& body);
 
-/// All modes of the job's band, with the proof of completeness. Warns of modes outside the band and of mechanisms. Moves the elimination
-/// order out of the body. Phase "modes". Collective. Throws on every rank: InputError, SolveError, SystemError, naming the body and the
-/// job; eigen::Stopped when a signal requested a checkpoint.
-eigen::Modes find_modes(Run& run, const Setting& setting, Body& body, const AssembledSystem& system);
+/// All modes of the job's band and of a little above it, whose corrected frequencies may be in it, with the proof of completeness. Warns of
+/// modes below the band and of mechanisms. Phase "modes". Collective. Throws on every rank: InputError, SolveError, SystemError, naming the
+/// body and the job; eigen::Stopped when a signal requested a checkpoint.
+eigen::Modes find_modes(Run& run, const Setting& setting, const Body& body, const eigen::Problem& problem);
+
+/// Continues `known`, a result of find_modes(), up to high_hz. Without checkpoints: a run stopped there resumes from `known`.
+eigen::Modes find_more_modes(Run& run, const Setting& setting, const Body& body, const eigen::Problem& problem, double high_hz,
+                             const eigen::Modes& known);
 
 /// Assembles K and M, finds the modes of the job's band, and estimates their errors. Frees K, M and the elimination order of the body.
 /// Collective. Throws on every rank: InputError, SolveError, SystemError, naming the body and the job; eigen::Stopped when a signal

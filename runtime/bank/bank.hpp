@@ -176,7 +176,7 @@ struct Bank {
   std::optional<Proof> proof;  // missing in version 1.0
   Counts counts;
   std::array<double, 2> band_hz{20.0, 20000.0};
-  bool complete = true;  // all modes of the band are present; false if max_modes or calc_reduced kept the lowest corrected frequencies
+  bool complete = true;  // all modes of the band are present, by corrected frequencies at its upper end; false: the lowest, or unsure
   // "T4", "T10"; "analytic": string, beam, membrane, plate or table (since 1.4); "imported": other program, accuracy unknown (since 1.8)
   std::string element;
   std::string mass;        // "consistent" or "lumped"

@@ -84,25 +84,31 @@ Check check_completeness(const Bank& bank, const Proof& proof) {
   for (std::size_t i = 0; i + 1 < proof.cut_hz.size(); ++i) {
     const std::int64_t wanted = proof.below[i + 1] - proof.below[i];
     const std::int64_t held = count_modes_below(bank, proof.cut_hz[i + 1]) - count_modes_below(bank, proof.cut_hz[i]);
-    // max_modes and calc_reduced keep the lowest modes: only past the end of the list may counts exceed the bank.
-    const bool is_cut_here = !bank.complete && (proof.complete_below_hz > 0.0 ? proof.cut_hz[i + 1] > proof.complete_below_hz
-                                                                              : count_modes_below(bank, proof.cut_hz[i + 1]) == modes);
+    // The lowest modes are kept, or those of the band, by their corrected frequencies: only past the end of the list may counts exceed it.
+    const bool is_cut_here = proof.complete_below_hz > 0.0 ? proof.cut_hz[i + 1] > proof.complete_below_hz
+                                                           : !bank.complete && count_modes_below(bank, proof.cut_hz[i + 1]) == modes;
     if (held == wanted || (is_cut_here && held < wanted)) continue;
     faults.add("{} modes lie between {:.6g} and {:.6g} Hz by the counts, and the bank holds {}", wanted, proof.cut_hz[i],
                proof.cut_hz[i + 1], held);
   }
-  const bool adds_up = bank.complete ? proof.found == counted && modes == counted : proof.found >= modes && proof.found <= counted;
+  const bool is_whole = bank.complete && proof.complete_below_hz == 0.0;
+  const bool adds_up = is_whole ? proof.found == counted && modes == counted : proof.found >= modes && proof.found <= counted;
   if (!adds_up) {
     faults.add("{} modes were found, {} are stored, and the counts give {} - {} = {}", proof.found, modes, proof.below.back(),
                proof.below.front(), counted);
   }
-  if (bank.complete ? proof.complete_below_hz != 0.0 : !(proof.complete_below_hz >= 0.0))
+  // A complete bank without modes of the mesh lacks those whose corrected frequencies are above the band.
+  const bool may_lack = !bank.complete || (!bank.corrected.is_empty() && proof.found == counted && proof.found > modes);
+  if (may_lack ? !(proof.complete_below_hz >= 0.0) : proof.complete_below_hz != 0.0)
     faults.add("complete_below_hz is {:.6g}, of a bank that is {}", proof.complete_below_hz, bank.complete ? "complete" : "cut");
   return {"complete",
-          bank.complete ? fmt::format("{} - {} = {} modes, all of them found; every interval between cuts agrees", proof.below.back(),
-                                      proof.below.front(), counted)
-                        : fmt::format("the lowest {} of {} - {} = {} modes; every interval between cuts agrees", modes, proof.below.back(),
-                                      proof.below.front(), counted),
+          is_whole ? fmt::format("{} - {} = {} modes, all of them found; every interval between cuts agrees", proof.below.back(),
+                                 proof.below.front(), counted)
+          : bank.complete
+              ? fmt::format("{} - {} = {} modes of the mesh, {} of them in the band once corrected; every interval between cuts agrees",
+                            proof.below.back(), proof.below.front(), counted, modes)
+              : fmt::format("the lowest {} of {} - {} = {} modes; every interval between cuts agrees", modes, proof.below.back(),
+                            proof.below.front(), counted),
           faults.take()};
 }
 
@@ -246,7 +252,9 @@ std::string describe_completeness(const Bank& bank) {
   const Proof& proof = *bank.proof;
   const std::int64_t counted = proof.below.back() - proof.below.front();
   std::string text = bank.complete ? fmt::format("{} modes in {:g} .. {:g} Hz and no more", modes, low, high)
-                                   : fmt::format("the lowest {} of {} modes in {:g} .. {:g} Hz", modes, counted, low, high);
+                     : static_cast<std::int64_t>(modes) == counted
+                         ? fmt::format("{} modes in {:g} .. {:g} Hz, perhaps not all", modes, low, high)
+                         : fmt::format("the lowest {} of {} modes in {:g} .. {:g} Hz", modes, counted, low, high);
   std::int64_t rigid = 0;
   for (const std::int64_t count : proof.rigid_per_component) rigid += count;
   text += fmt::format(": {} below {:.6g} Hz and {} below {:.6g} Hz {}, {} rigid", proof.below.front(), proof.cut_hz.front(),

@@ -302,7 +302,9 @@ FileForm make_file_form(const Bank& bank) {
 }
 
 std::array<int, 2> find_version(const Bank& bank, bool is_packed) {
-  if (!bank.sensitivities.is_empty()) return is_packed ? std::array{2, 5} : std::array{1, 9};
+  const bool is_cut_across = bank.complete && bank.proof && bank.proof->complete_below_hz > 0.0;
+  const bool has_above = !bank.corrected.is_empty() && bank.mode_count() > 0 && bank.freq_hz(bank.mode_count() - 1) > bank.band_hz[1];
+  if (!bank.sensitivities.is_empty() || is_cut_across || has_above) return is_packed ? std::array{2, 5} : std::array{1, 9};
   if (bank.element == "imported" || !bank.facet_error_cents.empty()) return is_packed ? std::array{2, 4} : std::array{1, 8};
   if (!bank.quartic.is_empty()) return is_packed ? std::array{2, 3} : std::array{1, 7};
   const bool is_mixed = !bank.multipoles.mixing.is_empty();

@@ -1,6 +1,7 @@
 #include "runtime/bank/select.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "runtime/base/sort_order.hpp"
 
@@ -36,6 +37,33 @@ void renumber_groups(Proof& proof, const std::vector<std::size_t>& kept) {
   proof.cluster_count.resize(groups);
 }
 
+constexpr double kEdge = 1e-9;  // relative, of lambda: modes so near the end of the band belong to it
+
+/// Frequency [Hz] between the mode `gone` and the modes below it, not below the band's end; 0 if nothing separates them.
+double find_end_between(const Bank& bank, std::size_t gone) {
+  constexpr double kClear = 8.0;  // of the uncertainty of a mode
+  const double low_hz = std::max(bank.band_hz[1], gone > 0 ? bank.freq_hz(gone - 1) : 0.0), high_hz = bank.freq_hz(gone);
+  const double unsure_cents = bank.algebraic_error_cents.empty() ? 0.0 : kClear * bank.algebraic_error_cents[gone];
+  return high_hz > low_hz * std::exp2(unsure_cents / 1200) * (1 + kEdge) ? std::sqrt(0.5 * (low_hz * low_hz + high_hz * high_hz)) : 0.0;
+}
+
+/// Ends the proof at `end_hz` below the mode `gone` and all above it.
+void end_proof(const Bank& bank, double end_hz, std::size_t gone, Proof& proof) {
+  const std::int64_t below = proof.below.back() - static_cast<std::int64_t>(bank.mode_count() - gone);
+  while (proof.cut_hz.size() > 1 && proof.cut_hz.back() >= end_hz) {
+    proof.cut_hz.pop_back();
+    proof.below.pop_back();
+    proof.margin.pop_back();
+  }
+  const double end = end_hz * end_hz;
+  const auto calc_margin = [&](double hz) { return std::abs(hz * hz - end) / end; };
+  proof.cut_hz.push_back(end_hz);
+  proof.below.push_back(below);
+  proof.margin.push_back(std::min({calc_margin(bank.freq_hz(gone)), gone > 0 ? calc_margin(bank.freq_hz(gone - 1)) : 1.0, 1.0}));
+  proof.found = static_cast<std::int64_t>(gone);
+  proof.method += "; at the upper end what the count above it leaves less the modes between";
+}
+
 }  // namespace
 
 std::vector<std::size_t> sort_modes(const Bank& bank) {
@@ -62,6 +90,23 @@ void select_modes(Bank& bank, const std::vector<std::size_t>& chosen) {
   bank.sensitivities = select_sensitive(bank.sensitivities, chosen);
   select_values(bank.supports.reaction, chosen, 6 * bank.supports.count());
   select_values(bank.supports.energy, chosen, bank.supports.count());
+}
+
+void keep_band(Bank& bank) {
+  if (bank.corrected.is_empty()) return;
+  std::vector<std::size_t> kept;
+  for (std::size_t m = 0; m < bank.mode_count(); ++m)
+    if (bank.corrected.freq_hz[m] <= bank.band_hz[1] * (1 + kEdge)) kept.push_back(m);
+  if (kept.size() == bank.mode_count()) return;
+  std::size_t first_gone = 0;
+  while (first_gone < kept.size() && kept[first_gone] == first_gone) ++first_gone;
+  const double end_hz = first_gone == kept.size() && bank.complete ? find_end_between(bank, first_gone) : 0.0;
+  if (bank.proof && end_hz > 0.0)
+    end_proof(bank, end_hz, first_gone, *bank.proof);
+  else if (bank.proof)
+    bank.proof->complete_below_hz = bank.freq_hz(first_gone);
+  select_modes(bank, kept);
+  if (bank.proof) renumber_groups(*bank.proof, kept);
 }
 
 void keep_lowest(Bank& bank, std::size_t count) {

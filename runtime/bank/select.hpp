@@ -14,6 +14,10 @@ std::vector<std::size_t> sort_modes(const Bank& bank);
 /// Keeps the modes `chosen`, in that order, in all per-mode arrays. The proof is unchanged.
 void select_modes(Bank& bank, const std::vector<std::size_t>& chosen);
 
+/// Keeps the modes whose corrected frequency is not above the band, in the mesh's order. If they are the lowest of the mesh, the proof ends
+/// between the last and the first removed one, where the count follows from the one above and the modes between.
+void keep_band(Bank& bank);
+
 /// Keeps the `count` modes of lowest corrected frequency, in the mesh's order. The proof is truncated below the first removed mode. No
 /// effect if there are no more.
 void keep_lowest(Bank& bank, std::size_t count);

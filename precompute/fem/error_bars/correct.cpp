@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "runtime/base/sort_order.hpp"
 
@@ -142,7 +143,12 @@ Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, co
   corrections.cents = widen_for_order(level.lambda, own, level.unlisted);
   for (std::size_t m = 0; m < parts.size(); ++m)
     corrections.own_cents.push_back(std::max(own.stated[m] - own.low[m], own.high[m] - own.stated[m]));
-  corrections.complete_below = find_lowest_unlisted(level.lambda, own, level.unlisted);
+  corrections.complete_below = find_lowest_unlisted(level.lambda, own.low, level.unlisted);
+  // No mode is corrected by more: it would be too stiff.
+  const Unlisted& unlisted = level.unlisted;
+  const double most = level.kind == Kind::kT4 ? 1 - kStiffT4 * (0.94 - kStiffT4 * (0.62 - 0.5 * kStiffT4)) : 1 / (1 + kStiffT10);
+  const double top = std::max(level.lambda.back(), 4 * std::numbers::pi * std::numbers::pi * unlisted.high_hz * unlisted.high_hz);
+  corrections.stated_above = std::max(find_lowest_unlisted(level.lambda, own.stated, unlisted), most * top);
   if (level.kind == Kind::kT4)  // where bending is octaves too high, the k-th of the list need not be the k-th of the body
     for (std::size_t m = 0; m < parts.size(); ++m)
       if (bank::is_reliable(corrections.correction[m]) && corrections.cents[m] > kOverlaid * (own.high[m] - own.stated[m]))

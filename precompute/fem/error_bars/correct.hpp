@@ -40,6 +40,7 @@ struct Corrections {
   std::vector<double> own_cents;  // (m) bar of the mode itself, known by its shape: no longer where others may take its place in the list
   std::vector<double> facet_cents;  // (m) as ErrorBars::facet_cents, around `lambda`; empty: no facets in doubt
   double complete_below = 0.0;      // [rad^2/s^2] modes of the body that are not listed lie above
+  double stated_above = 0.0;        // [rad^2/s^2] stated values of modes of the mesh that are not listed lie above
   // (m) one mesh: half the mesh's bar (T4: 0.4 of it); two meshes: a quarter (most T10: an eighth, see docs/error-bars.md), up to twice
   // that where T10 nearly agree; rough estimates: the mesh's own interval; uncorrected modes: the mesh's bar; disputed modes: the distance
   // of the two meshes

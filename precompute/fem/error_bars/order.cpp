@@ -39,11 +39,11 @@ double predict(std::span<const double> at, std::span<const double> cents, double
 
 }  // namespace
 
-double find_lowest_unlisted(std::span<const double> lambda, const OwnIntervals& own, const Unlisted& unlisted) {
+double find_lowest_unlisted(std::span<const double> lambda, std::span<const double> moved, const Unlisted& unlisted) {
   std::vector<double> at, reach;
   for (std::size_t m = 0; m < lambda.size(); ++m) {
     at.push_back(600 * std::log2(lambda[m] / lambda[0]));
-    reach.push_back(std::max(-own.low[m], 0.0));
+    reach.push_back(std::max(-moved[m], 0.0));
   }
   const double high = 4 * std::numbers::pi * std::numbers::pi * unlisted.high_hz * unlisted.high_hz;
   const double top = high > 0 ? std::max(at.back(), 600 * std::log2(high / lambda[0])) : at.back();
@@ -64,8 +64,8 @@ std::vector<double> widen_for_order(std::span<const double> lambda, const OwnInt
   const std::vector<std::size_t> order = base::find_sort_order(stated);
   std::sort(low.begin(), low.end());
   std::sort(high.begin(), high.end());
-  const double min = place(find_lowest_unlisted(lambda, own, unlisted));  // lower bound of all modes above
-  double max = at[0] - 1e9;                                               // upper bound of all modes below
+  const double min = place(find_lowest_unlisted(lambda, own.low, unlisted));  // lower bound of all modes above
+  double max = at[0] - 1e9;                                                   // upper bound of all modes below
   if (unlisted.below > 0 && unlisted.low_hz > 0) {
     const double bottom = std::min(at[0], place_hz(unlisted.low_hz));
     const auto octave = std::upper_bound(at.begin(), at.end(), bottom + kOctave) - at.begin();

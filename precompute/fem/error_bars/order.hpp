@@ -22,8 +22,9 @@ struct Unlisted {
   std::int64_t below = 0;  // number below, without rigid modes
 };
 
-/// Lower bound of the true lambda [rad^2/s^2] of unlisted modes above the list. Arguments as below. Pure.
-double find_lowest_unlisted(std::span<const double> lambda, const OwnIntervals& own, const Unlisted& unlisted);
+/// Least lambda [rad^2/s^2] of unlisted modes above the list if they move as those near its end do. moved: (m) cents above the frequency on
+/// the mesh: OwnIntervals::low gives a bound of the true values, OwnIntervals::stated the stated ones. Other arguments as below. Pure.
+double find_lowest_unlisted(std::span<const double> lambda, std::span<const double> moved, const Unlisted& unlisted);
 
 /// Bars [cents] of the stated frequencies: the k-th lowest of them is within its bar of the k-th true one, k counting unlisted modes below
 /// too. lambda: (m) of the mesh, ascending, m > 0. Returns (m), in the order of lambda. Pure.

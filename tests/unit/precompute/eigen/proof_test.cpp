@@ -48,6 +48,32 @@ TEST(Proof, agrees_with_dense_lapack) {
   EXPECT_NE(proof.method.find("L D L^T"), std::string::npos) << proof.method;
 }
 
+// All modes up to a higher end, of which the lower ones are known: two more factorisations, the same modes, and one proof for all.
+TEST(Proof, of_a_continued_band_is_of_the_whole_band) {
+  const Network two = test::join(make_block(4, 4, 9), make_block(3, 4, 8, {50, 0, 0}));
+  const std::vector<double> all = test::calc_all_eigenvalues(two);
+  const test::System system = test::make_system(two);
+  for (const double low_hz : {0.0, to_hz(0.5 * (all[20] + all[21]))}) {
+    const std::size_t first = low_hz > 0 ? 21 : 12;
+    Options options;
+    options.low_hz = low_hz > 0 ? low_hz : 1.0;
+    options.high_hz = to_hz(0.5 * (all[90] + all[91]));
+    const Modes lower = solve_modes(system.problem, options);
+    options.known = &lower;
+    options.high_hz = to_hz(0.5 * (all[130] + all[131]));
+    const Modes modes = solve_modes(system.problem, options);
+    expect_eigenvalues(modes, {all.begin() + static_cast<std::ptrdiff_t>(first), all.begin() + 131});
+    EXPECT_EQ(modes.band_count, 131 - static_cast<std::int64_t>(first));
+    EXPECT_EQ(modes.count_below_low, static_cast<std::int64_t>(first));
+    EXPECT_EQ(modes.factor.factorisations, lower.factor.factorisations + 2);
+    EXPECT_LT(modes.orthonormality_error, 1e-10);
+    EXPECT_LE(*std::max_element(modes.residual.begin(), modes.residual.end()), options.tolerance);
+    EXPECT_GE(modes.proof.counts.size(), lower.proof.counts.size() + 2);
+    for (const Count& count : modes.proof.counts)
+      EXPECT_EQ(count.below, std::count_if(all.begin(), all.end(), [&](double x) { return x < std::pow(count.freq_hz * 2 * M_PI, 2); }));
+  }
+}
+
 // A low end of the band is not counted: the shift inside proves that only the rigid modes are below.
 TEST(Proof, leaves_a_low_end_to_the_shift_inside) {
   const Network block = make_block(4, 5, 9);

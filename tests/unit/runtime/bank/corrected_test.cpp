@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <numeric>
 #include <string>
 
 #include "runtime/bank/edits.hpp"
@@ -129,6 +130,36 @@ TEST(Corrected, DetermineTheLowestModes) {
     write_bank(kept, file);
     EXPECT_EQ(read_bank(file).proof->complete_below_hz, bound);
   }
+}
+
+TEST(Corrected, SelectTheBand) {
+  const Bank bank = example::make_corrected_bank(2, kModes);
+  std::vector<double> ends = bank.corrected.freq_hz;
+  std::sort(ends.begin(), ends.end());
+  int cut_across = 0;
+  for (std::size_t count = 1; count < kModes; ++count) {
+    Bank kept = bank;
+    kept.band_hz[1] = std::midpoint(ends[count - 1], ends[count]);
+    keep_band(kept);
+    EXPECT_TRUE(kept.complete);
+    EXPECT_EQ(find_faults(kept), std::vector<std::string>{}) << count;
+    std::vector<double> here = kept.corrected.freq_hz;
+    std::sort(here.begin(), here.end());
+    EXPECT_EQ(here, std::vector<double>(ends.begin(), ends.begin() + static_cast<std::ptrdiff_t>(count)));
+    const bool is_across = kept.proof->complete_below_hz > 0.0;
+    cut_across += is_across ? 1 : 0;
+    EXPECT_EQ(kept.proof->found, static_cast<std::int64_t>(is_across ? kModes : count)) << "the proof ends with the list, if it can";
+    EXPECT_GE(kept.proof->cut_hz.back(), kept.band_hz[1]);
+    const bool is_new = is_across || kept.freq_hz(count - 1) > kept.band_hz[1];
+    EXPECT_EQ(find_version(kept), (is_new ? std::array{1, 9} : std::array{1, 4})) << count;
+    Bank spoiled = kept;  // a mode below the end of the proof is missing
+    std::vector<std::size_t> others;
+    for (std::size_t m = 1; m < count; ++m) others.push_back(m);
+    select_modes(spoiled, others);
+    EXPECT_FALSE(find_faults(spoiled).empty()) << count;
+  }
+  EXPECT_GT(cut_across, 0) << "the example has modes that change places";
+  EXPECT_LT(cut_across, static_cast<int>(kModes) - 1);
 }
 
 TEST(Corrected, TruncationIsIdempotent) {
