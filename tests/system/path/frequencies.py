@@ -69,7 +69,7 @@ def check_short_list(folder):
     _, modes = solve(folder, "long", mass="lumped", band_hz=[20, 9000])
     mesh = modes["frequency_hz"]
     assert len(mesh) > 4 and numpy.all(numpy.isfinite(modes["corrected_error_cents"]))
-    for count in 1, 3:
+    for count in (1,):
         name = f"short-{count}"
         said, modes = solve(folder, name, mass="lumped", band_hz=[20, (mesh[count - 1] + mesh[count]) / 2])
         assert "frequencies have no error bars" in said, said
@@ -86,10 +86,13 @@ def check_short_list(folder):
         shown = json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL).group(1))["bank"]
         assert shown["modes"]["corrected_cents"] == shown["modes"]["body_cents"] == [None] * count, shown["modes"]
         assert "not all of them have an estimate against the body" in shown["accuracy"], shown["accuracy"]
+    # A band of corrected frequencies looks further on so coarse a mesh: there are enough modes for bars.
+    _, modes = solve(folder, "wider", mass="lumped", band_hz=[20, (mesh[2] + mesh[3]) / 2])
+    assert len(modes["frequency_hz"]) > 3 and numpy.all(numpy.isfinite(modes["corrected_error_cents"])), modes
     # The lowest modes of a longer list are unaffected: more modes are computed, then cut.
     _, modes = solve(folder, "cut", mass="lumped", band_hz=[20, 9000], max_modes=2)
     assert len(modes["frequency_hz"]) == 2 and numpy.all(numpy.isfinite(modes["corrected_error_cents"])), modes
-    print(f"short lists: {len(mesh)} modes have bars, 3 and 1 have none, 2 of more have some")
+    print(f"short lists: {len(mesh)} modes have bars, 1 has none, 2 of more have some")
 
 
 def check_damped(folder):
