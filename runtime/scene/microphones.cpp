@@ -29,8 +29,8 @@ std::optional<synth::ListeningHead> make_head(const Scene& scene, double rate_hz
   const SceneListener& listener = scene.listener;
   const std::array<Vec3, 2> ears = calc_ears(listener);
   if (has_ambisonics(scene))
-    return synth::ListeningHead{.rotation = synth::calc_head_rotation(listener.facing, ears[0] - ears[1]),
-                                .ambisonic_order = listener.order};
+    return synth::ListeningHead{
+        .head = nullptr, .rotation = synth::calc_head_rotation(listener.facing, ears[0] - ears[1]), .ambisonic_order = listener.order};
   return synth::ListeningHead{.head = listener.sofa.empty() ? head::make_sphere(rate_hz, {.radius_m = 0.5 * listener.ear_distance_m})
                                                             : head::read_sofa(listener.sofa, rate_hz),
                               .rotation = synth::calc_head_rotation(listener.facing, ears[0] - ears[1])};
