@@ -71,6 +71,10 @@ class Folder:
             with h5py.File(self.path / "out.bank") as bank:
                 bank.visititems(lambda name, item: outcome.bank.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
             outcome.freq_hz = outcome.bank["modes/frequency_hz"]
+            # The band is of corrected frequencies: up to here the bank has all modes of the mesh.
+            below_hz = outcome.bank.get("proof/complete_below_hz")
+            if below_hz is not None:
+                outcome.freq_hz = outcome.freq_hz[outcome.freq_hz < below_hz]
             outcome.record = json.loads((self.path / "out.bank.resolved.json").read_text())
             for name, array in outcome.bank.items():
                 assert np.issubdtype(np.asarray(array).dtype, np.number) is False or np.isfinite(array).all(), f"{name} is not finite"

@@ -121,8 +121,8 @@ double ModalStates::add_pulses(Strike& strike, std::map<int, ModalState>& before
 }
 
 double ModalStates::take(int body, double energy_j) {
-  ModalState& state = states_[body];
-  if (!bodies_.has_modes(body) || state.q.empty() || bodies_.is_in_impact(body)) return 0.0;
+  if (!bodies_.has_modes(body) || states_[body].q.empty() || bodies_.is_in_impact(body)) return 0.0;
+  ModalState& state = advance(body, bodies_.get_time());
   const double all_j = bodies_.solid(body).modes->calc_energy(state.q, state.q_dot), taken_j = std::min(energy_j, all_j);
   if (!(taken_j > 0.0)) return 0.0;
   const double part = std::sqrt(1.0 - taken_j / all_j);

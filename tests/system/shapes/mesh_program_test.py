@@ -72,7 +72,7 @@ with tempfile.TemporaryDirectory() as name:
         (["--shape", "bar", "--nodes", "100", "--edge", "0.1", "-o", "out.msh"], ["--nodes and --edge", "one of them"]),
         (["--shape", "bar", "--nodes", "-5", "-o", "out.msh"], ["-5 nodes", "positive"]),
         (["--shape", "bar", "--order", "3", "-o", "out.msh"], ["--order", "3"]),
-        (["--shape", "bar", "-o", "out.vtu"], ["out.vtu", ".msh"]),
+        (["--shape", "bar", "-o", "out.ply"], ["out.ply", ".msh"]),
         (["--shape", "bar", "-o", "out.msh", "--json", "./out.msh"], ["--json", "overwrite the mesh"]),
         (["--shape", "bar"], ["-o is missing"]),
         (["-o", "out.msh"], ["SURFACE", "--shape"]),
