@@ -424,7 +424,7 @@ def accuracy(folder):
         said, seen = "", 0
         for line in run.stdout:
             said += line
-            seen += line.startswith("modes ")
+            seen += line.startswith("assemble ")
             if seen == trials and re.search("[0-9] of [0-9]+ modes", line):
                 break
         run.send_signal(signal.SIGUSR1)
