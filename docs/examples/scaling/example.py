@@ -15,10 +15,13 @@ ALPHA1, ALPHA2 = 1e-8, 6.0  # of every job: damping follows the scaled eigenvalu
 
 
 def read_bank(file):
-    """(eigenvalues, decays, shapes (V, m, 3), vertices) of a bank."""
+    """(eigenvalues, decays, shapes (V, m, 3), vertices) of a bank, up to where it has all modes of the mesh: bands are of corrected
+    frequencies."""
     with h5py.File(file) as bank:
-        shapes = bank["modes/shape"][:] * bank["modes/shape_scale"][:][None, :, None]
-        return (2 * math.pi * bank["modes/frequency_hz"][:]) ** 2, bank["modes/decay"][:], shapes, bank["mesh/vertices"][:]
+        hz = bank["modes/frequency_hz"][:]
+        count = int((hz < bank["proof/complete_below_hz"][()]).sum()) if "proof/complete_below_hz" in bank else len(hz)
+        shapes = bank["modes/shape"][:, :count] * bank["modes/shape_scale"][:count][None, :, None]
+        return (2 * math.pi * hz[:count]) ** 2, bank["modes/decay"][:count], shapes, bank["mesh/vertices"][:]
 
 
 def find_groups(eigenvalues):
