@@ -4,6 +4,8 @@
 // Source: Sylvester's law of inertia; Parlett 1998, The symmetric eigenvalue problem, section 3.3.
 // Deviations: counts cannot be repeated without K and M; they are trusted if the backward error of the factorisation is far below the
 //   distance to the nearest mode.
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
