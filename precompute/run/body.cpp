@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "precompute/run/cut_mesh.hpp"
 #include "precompute/run/meshing.hpp"
 #include "precompute/run/stages.hpp"
+#include "runtime/bank/select.hpp"
 
 namespace carillon::run {
 namespace {
@@ -207,11 +209,10 @@ std::optional<std::int64_t> find_computed_count(const job::JobSpec& job) {
 }
 
 std::vector<std::size_t> find_bank_modes(const job::JobSpec& job, const error_bars::Corrections& corrections) {
-  constexpr double kEdge = 1e-9;  // as of the eigensolver's band
-  const double omega = 2 * std::numbers::pi * job.band_hz[1];
   std::vector<std::size_t> modes =
       error_bars::find_lowest(corrections, static_cast<std::size_t>(job.max_modes.value_or(std::numeric_limits<int>::max())));
-  std::erase_if(modes, [&](std::size_t m) { return corrections.lambda[m] > omega * omega * (1 + kEdge); });
+  std::erase_if(
+      modes, [&](std::size_t m) { return !bank::is_below_end(std::sqrt(corrections.lambda[m]) / (2 * std::numbers::pi), job.band_hz[1]); });
   return modes;
 }
 

@@ -45,23 +45,32 @@ double find_wider_end(const Run& run, const eigen::Modes& modes, const error_bar
 }
 
 /// Collective. Throws on every rank: SolveError, SystemError, naming the body and the job.
-ModeProperties calc_errors(Run& run, const Body& body, const AssembledSystem& system, const eigen::Modes& modes) {
-  run.log.begin("errors", "error bars and decays");
-  const mesh::LocalMesh& mesh = body.pieces.local;
-  const fem::Materials& materials = system.properties.materials;
-  ModeProperties errors;
-  fem::Decay decay = fem::calc_decay(run.comm, mesh, materials, run.job.mass, modes.lambda, modes.shapes);
-  errors.decay_per_s = std::move(decay.decay_per_s);
-  errors.shares = std::move(decay.shares);
-  errors.supports = fem::calc_supports(run.comm, mesh, materials, run.job.mass, modes.lambda, modes.shapes);
-  errors.bars = name_errors(body.source, run, [&] { return calc_bars(run, body, system, describe(run, modes)); });
-  if (errors.bars.level.is_guessed)
+error_bars::ErrorBars calc_errors(Run& run, const Body& body, const AssembledSystem& system, const eigen::Modes& modes) {
+  run.log.begin("errors", "error bars");
+  error_bars::ErrorBars bars = name_errors(body.source, run, [&] { return calc_bars(run, body, system, describe(run, modes)); });
+  if (bars.level.is_guessed)
     run.log.warn_once(
         "some faces of the mesh are one element wide and meet at 50 to 80 degrees: they may be planes of the body or a coarse round "
         "surface. The frequencies are those of planes; the change for a round surface is stated as \"facets in doubt\". Smaller elements, "
         "or mid-side nodes on the surface, remove the doubt");
   run.log.end();
-  return errors;
+  return bars;
+}
+
+/// Collective.
+ModeProperties calc_properties(Run& run, const Body& body, const AssembledSystem& system, const eigen::Modes& modes,
+                               error_bars::ErrorBars bars) {
+  run.log.begin("errors", "decays and forces on supports");
+  const mesh::LocalMesh& mesh = body.pieces.local;
+  const fem::Materials& materials = system.properties.materials;
+  ModeProperties properties;
+  fem::Decay decay = fem::calc_decay(run.comm, mesh, materials, run.job.mass, modes.lambda, modes.shapes);
+  properties.decay_per_s = std::move(decay.decay_per_s);
+  properties.shares = std::move(decay.shares);
+  properties.supports = fem::calc_supports(run.comm, mesh, materials, run.job.mass, modes.lambda, modes.shapes);
+  properties.bars = std::move(bars);
+  run.log.end();
+  return properties;
 }
 
 void write_matrices(Run& run, const Body& body, const AssembledSystem& system) {
@@ -98,11 +107,12 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   const eigen::Problem problem{system.matrices.stiffness, system.matrices.mass, make_layout(body)};
   solved.modes = find_modes(run, setting, body, problem);
   save_if_requested(run, solved.modes);
-  solved.errors = calc_errors(run, body, system, solved.modes);
-  for (double end_hz = 0.0; (end_hz = find_wider_end(run, solved.modes, solved.errors.bars.corrected)) > 0.0;) {
+  error_bars::ErrorBars bars = calc_errors(run, body, system, solved.modes);
+  for (double end_hz = 0.0; (end_hz = find_wider_end(run, solved.modes, bars.corrected)) > 0.0;) {
     solved.modes = find_more_modes(run, setting, body, problem, end_hz, solved.modes);
-    solved.errors = calc_errors(run, body, system, solved.modes);
+    bars = calc_errors(run, body, system, solved.modes);
   }
+  solved.errors = calc_properties(run, body, system, solved.modes, std::move(bars));
   if (find_bank_modes(run.job, solved.errors.bars.corrected).empty()) run.log.warn("no mode in the band: the bank will be silent");
   save_if_requested(run, solved.modes, has_later_stages(run.job));  // later stages may take longer than the modes
   if (run.checkpoint) run.checkpoint->end();

@@ -277,10 +277,6 @@ base::Json make_nonlinear(const QuarticEnergy& energy) {
   return nonlinear;
 }
 
-}  // namespace
-
-namespace {
-
 /// Program or format that imported modes come from.
 std::string find_origin_program(const Bank& bank) {
   const std::optional<base::Json> record = base::Json::parse(bank.provenance);

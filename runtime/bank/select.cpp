@@ -37,14 +37,12 @@ void renumber_groups(Proof& proof, const std::vector<std::size_t>& kept) {
   proof.cluster_count.resize(groups);
 }
 
-constexpr double kEdge = 1e-9;  // relative, of lambda: modes so near the end of the band belong to it
-
 /// Frequency [Hz] between the mode `gone` and the modes below it, not below the band's end; 0 if nothing separates them.
 double find_end_between(const Bank& bank, std::size_t gone) {
-  constexpr double kClear = 8.0;  // of the uncertainty of a mode
+  constexpr double kClear = 8.0, kGap = 1e-9;  // of the uncertainty of a mode; relative
   const double low_hz = std::max(bank.band_hz[1], gone > 0 ? bank.freq_hz(gone - 1) : 0.0), high_hz = bank.freq_hz(gone);
   const double unsure_cents = bank.algebraic_error_cents.empty() ? 0.0 : kClear * bank.algebraic_error_cents[gone];
-  return high_hz > low_hz * std::exp2(unsure_cents / 1200) * (1 + kEdge) ? std::sqrt(0.5 * (low_hz * low_hz + high_hz * high_hz)) : 0.0;
+  return high_hz > low_hz * std::exp2(unsure_cents / 1200) * (1 + kGap) ? std::sqrt(0.5 * (low_hz * low_hz + high_hz * high_hz)) : 0.0;
 }
 
 /// Ends the proof at `end_hz` below the mode `gone` and all above it.
@@ -96,7 +94,7 @@ void keep_band(Bank& bank) {
   if (bank.corrected.is_empty()) return;
   std::vector<std::size_t> kept;
   for (std::size_t m = 0; m < bank.mode_count(); ++m)
-    if (bank.corrected.freq_hz[m] <= bank.band_hz[1] * (1 + kEdge)) kept.push_back(m);
+    if (is_below_end(bank.corrected.freq_hz[m], bank.band_hz[1])) kept.push_back(m);
   if (kept.size() == bank.mode_count()) return;
   std::size_t first_gone = 0;
   while (first_gone < kept.size() && kept[first_gone] == first_gone) ++first_gone;

@@ -14,6 +14,9 @@ std::vector<std::size_t> sort_modes(const Bank& bank);
 /// Keeps the modes `chosen`, in that order, in all per-mode arrays. The proof is unchanged.
 void select_modes(Bank& bank, const std::vector<std::size_t>& chosen);
 
+/// True if a mode of `freq_hz` belongs to a band that ends at `end_hz`: to 1e-9 of the eigenvalue, as in the eigensolver.
+inline bool is_below_end(double freq_hz, double end_hz) { return freq_hz <= end_hz * (1 + 0.5e-9); }
+
 /// Keeps the modes whose corrected frequency is not above the band, in the mesh's order. If they are the lowest of the mesh, the proof ends
 /// between the last and the first removed one, where the count follows from the one above and the modes between.
 void keep_band(Bank& bank);
