@@ -126,14 +126,15 @@ void Sounding::add_spot(std::span<const rigid::Hit* const> hits, const rigid::St
     blow.places[side] = known && hits.size() == 1 ? *known : scene_.find_place(body, where, (-sign) * normal, first.triangles[side]);
     blow.impulses_n_s[side] = transpose(scene_.motions[body].rotation) * (sign * impulse);
   }
-  const auto scale = [](drive::Blow part, double share, double stretch) {
+  const auto add = [&](double share, double duration_s) {
+    drive::Blow part = blow;
     part.impulse_n_s *= share;
     for (Vec3& impulse : part.impulses_n_s) impulse = share * impulse;
-    part.duration_s *= stretch;
-    return part;
+    part.duration_s = duration_s;
+    (void)drive::add_pulses(scene_, part, masks_ ? &*masks_ : nullptr, events);
   };
-  for (const auto& [share, stretch] : {std::pair(strike.first_share, 1.0), std::pair(1.0 - strike.first_share, strike.stretch)})
-    if (share > 0.0) (void)drive::add_pulses(scene_, scale(blow, share, stretch), masks_ ? &*masks_ : nullptr, events);
+  add(strike.first_share, blow.duration_s);
+  if (strike.first_share < 1.0) add(1.0 - strike.first_share, strike.prolong(blow.duration_s));
 }
 
 void Sounding::add(const rigid::Forces& forces, std::vector<events::Event>& events) {

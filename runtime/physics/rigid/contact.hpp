@@ -122,6 +122,7 @@ struct Strike {
   double modes_j = 0.0;  // transferred to modes
   // Pulses on bodies that bend far: the first with the length of Hertz and this share of the impulse, the rest prolonged.
   double first_share = 1.0, stretch = 1.0;
+  double prolong(double length_s) const { return std::max(length_s, std::min(stretch * length_s, kLongestPulseS)); }
 };
 
 /// Force of one contact of a modal impact, as impulses of equal steps; long ones are delivered in pieces.

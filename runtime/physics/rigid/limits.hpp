@@ -6,6 +6,7 @@ namespace carillon::rigid {
 inline constexpr double kMinImpactSpeedMS = 1e-3;   // m/s; slower touches are no impacts (a fall from 0.05 um)
 inline constexpr double kRattleSpeedMS = 8e-2;      // m/s; slower touches of a rattling pair are no impacts
 inline constexpr double kSimultaneousS = 1e-4;      // s; touches nearer in time are one impact
+inline constexpr double kLongestPulseS = 0.2;       // s; of a blow on a body that bends far
 inline constexpr double kTouchGapM = 1e-7;          // m; smaller gaps count as contact
 inline constexpr double kGapDriftM = 5e-7;          // m; change of the gap of a rolling contact per step, between bodies,
 inline constexpr double kGroundDriftM = 8e-6;       // m; and on the ground: less than a floor is rough

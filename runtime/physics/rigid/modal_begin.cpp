@@ -55,7 +55,7 @@ ModalImpact* ModalImpacts::find_own(const Step& step, const Hit& hit) {
 }
 
 bool ModalImpacts::predict(const Step& step, Collision& collision) {
-  bool integrate = false, bends = false;
+  bool integrate = false;
   for (int n = 0; Hit & hit : collision.hits) {
     const Contact& c = collision.contacts[n].get();
     Point& point = collision.points[n++];
@@ -73,7 +73,7 @@ bool ModalImpacts::predict(const Step& step, Collision& collision) {
       const int body = side == 0 ? hit.a : hit.b;
       if (!bodies_.has_modes(body)) continue;
       phi[side] = project(find_shape(bodies_, hit, side == 0), transpose(bodies_.placed(body).rotation) * hit.touch.normal);
-      if (bends_far(body, phi[side], 1.0 / inverse_mass, hit.approach_m_s)) hit.bends = bends = true;
+      if (bends_far(body, phi[side], 1.0 / inverse_mass, hit.approach_m_s)) hit.bends = true;
       if (bodies_.is_in_impact(body)) {
         is_free = false;
         continue;
@@ -90,7 +90,7 @@ bool ModalImpacts::predict(const Step& step, Collision& collision) {
       point.wanted = (hit.restitution * hit.approach_m_s) * hit.touch.normal;
     }
   }
-  return integrate && !bends;
+  return integrate && std::none_of(collision.hits.begin(), collision.hits.end(), [](const Hit& hit) { return hit.bends; });
 }
 
 /// True if the modes of a soft body, with shape values `phi` along the normal of a hit, may deflect it beyond the linear range: by their

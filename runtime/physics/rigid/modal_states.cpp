@@ -113,7 +113,7 @@ double ModalStates::add_pulses(Strike& strike, std::map<int, ModalState>& before
       for (int m = 0; m < modes.size(); ++m)
         state.q_dot[m] += (shape[3 * m] * impulse[0] + shape[3 * m + 1] * impulse[1] + shape[3 * m + 2] * impulse[2]) *
                           (strike.first_share * std::sqrt(impact::calc_pulse_spectrum(omega[m] * length)) +
-                           (1.0 - strike.first_share) * std::sqrt(impact::calc_pulse_spectrum(omega[m] * strike.stretch * length)));
+                           (1.0 - strike.first_share) * std::sqrt(impact::calc_pulse_spectrum(omega[m] * strike.prolong(length))));
       given += modes.calc_energy(state.q, state.q_dot) - energy;
     }
   }
