@@ -9,12 +9,14 @@ import numpy as np
 FRICTION, RESTITUTION = 0.4, 0.5  # of every body
 CHAOTIC = ("box", "tube", "two", "pile", "bar", "slap", "rod", "row", "bead", "drop")
 STARTS_M = (0.001, -0.001)  # offsets of further starts: single bounces are chaotic,
-MORE_STARTS_M = (*STARTS_M, 0.002, -0.002)  # those of these three more than others
+MORE_STARTS = {"tube": 2, "rod": 2, "pile": 6, "row": 6}  # some more than others: this many to each side, 0.5 mm apart
 
 
 def get_starts(name):
     """Offsets of the further starts of a scene [m]."""
-    return () if name not in CHAOTIC else MORE_STARTS_M if name in ("tube", "pile", "row") else STARTS_M
+    if name in MORE_STARTS:
+        return tuple(sign * 0.0005 * k for k in range(1, MORE_STARTS[name] + 1) for sign in (1, -1))
+    return STARTS_M if name in CHAOTIC else ()
 
 
 BOX, BALL, TUBE = [0.06, 0.04, 0.025], [0.03, 0.03, 0.03], [0.075, 0.02, 0.02]
@@ -87,7 +89,7 @@ SCENES = {
     "two": (2, [place("a", "ball", BALL, (-0.1, 0, 0.5), velocity=(1, 0, 0)), place("b", "ball", BALL, (0, 0, 0.5))]),
     "pile": (3, make_pile(10, 1)),
     # The tracker's constants were chosen on the six above; bar, rod and pane changed rules.
-    "bar": (4, [place("bar", "bar", BAR, (0, 0, 0.25), (0, 75, 0), velocity=(0.2, 0, 0))]),
+    "bar": (4.5, [place("bar", "bar", BAR, (0, 0, 0.25), (0, 75, 0), velocity=(0.2, 0, 0))]),
     "slap": (3, [place("pane", "pane", PANE, (0, 0, 0.11), (0, 25, 0))]),
     "rod": (2, [place("rod", "rod", ROD, (0, -0.3, 0.1), (0, 12, 0), velocity=(0, 0.3, 0))]),
     "row": (1, [place(n, "ball", BALL, (x, 0, 0.03), velocity=(v, 0, 0), spin=(0, v / 0.03, 0), moved=m) for n, x, v, m in ROW]),
