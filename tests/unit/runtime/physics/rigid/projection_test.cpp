@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "tests/unit/runtime/physics/rigid/drops.hpp"
 #include "tests/unit/runtime/physics/rigid/momenta.hpp"
 #include "tests/unit/runtime/physics/rigid/stages.hpp"
 
@@ -136,6 +137,29 @@ TEST(projection, permitted_depth_unchanged) {
     EXPECT_EQ(stages.bodies.state(0).centre == before, allowed > 0.0);
     EXPECT_EQ(stages.ledger.costs.pushes > 0, allowed == 0.0);
   }
+}
+
+TEST(projection, touches_of_the_displaced_body) {
+  // An edge from below lifts one side of a lying coin by 0.3 mm; about its centre of mass the other side would turn 0.18 mm into the
+  // ground, where it had no touch.
+  const tests::DropBody coin = tests::make_drop_body(1, 0);
+  Solid block = make_box(1.0, {0.01, 0.04, 0.02});
+  block.fixed = true;
+  State lying, below;
+  lying.centre = {0, 0, 1e-3};
+  below.centre = {0.014, 0, 3e-4 - 0.01};
+  Stages stages({coin.solid, block}, {lying, below}, kWood, {0, 0, -kGravity});
+  stages.begin({{0, -1}, {0, 1}});
+  stages.island.pairs[0]->contacts.clear();
+  stages.projection.run(stages.step, kMaxDepthM, 0.0);
+  const auto find_lowest = [&](double from_m) {
+    double low = 1.0;
+    for (const Vec3& x : coin.vertices)
+      if (x[0] >= from_m) low = std::min(low, stages.bodies.state(0).centre[2] + (stages.bodies.placed(0).rotation * x)[2]);
+    return low;
+  };
+  EXPECT_GT(find_lowest(-1.0), -kMaxDepthM - kMissingDepthM);
+  EXPECT_GT(find_lowest(0.009), 3e-4 - 2.0 * kMaxDepthM);
 }
 
 TEST(projection, lift_by_impact_springs) {
