@@ -21,10 +21,12 @@ constexpr double kMaxHingeRad = kWidestHingeDeg * std::numbers::pi / 180.0 * (1.
 
 bool is_zero(const Vec3& x) { return x[0] == 0.0 && x[1] == 0.0 && x[2] == 0.0; }
 
-void check_contact_numbers(const std::string& who, double restitution, double friction, double young, double poisson) {
+void check_contact_numbers(const std::string& who, double restitution, double friction, double rolling, double young, double poisson) {
   if (!(restitution >= 0.0 && restitution <= 1.0)) throw InputError(fmt::format("{}: restitution {} is not within 0..1", who, restitution));
   if (!(friction >= 0.0 && std::isfinite(friction)))
     throw InputError(fmt::format("{}: friction {} must be a finite number, 0 or more", who, friction));
+  if (!(rolling >= 0.0 && std::isfinite(rolling)))
+    throw InputError(fmt::format("{}: rolling_resistance {} must be a finite number, 0 or more", who, rolling));
   if (!(young > 0.0 && std::isfinite(young)))
     throw InputError(fmt::format("{}: young_modulus_pa {} must be a finite number above 0", who, young));
   if (!(poisson > -1.0 && poisson <= 0.5)) throw InputError(fmt::format("{}: poisson_ratio {} is not within -1..0.5", who, poisson));
@@ -127,7 +129,8 @@ void check_entry(const BodySpec& b) {
 void check_body(const BodySpec& b) {
   const std::string who = fmt::format("body '{}'", b.name);
   if (b.bank == nullptr) throw InputError(who + ": has no bank; name the file of its mode bank");
-  check_contact_numbers(who, b.restitution, b.friction, b.bank->material.young_modulus_pa, b.bank->material.poisson_ratio);
+  check_contact_numbers(who, b.restitution, b.friction, b.rolling_resistance, b.bank->material.young_modulus_pa,
+                        b.bank->material.poisson_ratio);
   check_entry(b);
   if (!b.fixed) check_rigid(who, b.bank->rigid);
 }
@@ -141,7 +144,7 @@ void check(const WorldSpec& spec, const WorldOptions& options) {
     const GroundSpec& g = *spec.ground;
     if (!std::isfinite(g.height_m)) throw InputError("ground: the height must be a finite number");
     if (!(g.density_kg_m3 > 0.0 && std::isfinite(g.density_kg_m3))) throw InputError("ground: the density must be a finite number above 0");
-    check_contact_numbers("ground", g.restitution, g.friction, g.young_modulus_pa, g.poisson_ratio);
+    check_contact_numbers("ground", g.restitution, g.friction, g.rolling_resistance, g.young_modulus_pa, g.poisson_ratio);
   }
   for (const BodySpec& body : spec.bodies) check_body(body);
   check_joints(spec);

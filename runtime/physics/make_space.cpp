@@ -90,6 +90,7 @@ rigid::Solid SolidMaker::make(const BodySpec& b) {
   for (const Vec3& v : b.bank->vertices_m) solid.radius_m = std::max(solid.radius_m, calc_length(v - solid.centre_m));
   solid.restitution = b.restitution;
   solid.friction = b.friction;
+  solid.rolling_resistance = b.rolling_resistance;
   solid.young_modulus_pa = b.bank->material.young_modulus_pa;
   solid.poisson_ratio = b.bank->material.poisson_ratio;
   if (has_modes_) solid.modes = modes_.find(*b.bank);
@@ -140,8 +141,8 @@ rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options, Soli
   }
   std::optional<rigid::Ground> ground;
   if (spec.ground)
-    ground = {spec.ground->height_m, spec.ground->restitution, spec.ground->friction, spec.ground->young_modulus_pa,
-              spec.ground->poisson_ratio};
+    ground = {spec.ground->height_m,         spec.ground->restitution,   spec.ground->friction,
+              spec.ground->young_modulus_pa, spec.ground->poisson_ratio, spec.ground->rolling_resistance};
   const rigid::Links links = make_links(spec, solids, states);
   try {
     return rigid::Space(std::move(solids), std::move(states), ground, spec.gravity_m_s2,

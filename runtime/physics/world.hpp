@@ -24,6 +24,7 @@ struct BodySpec {
   Vec3 angular_velocity_rad_s{};     // world frame
   double restitution = 0.5;          // 0..1; a contact uses the geometric mean of both bodies
   double friction = 0.4;             // Coulomb, >= 0; a contact uses the geometric mean of both bodies
+  double rolling_resistance = 1e-3;  // couple over radius times load, >= 0; a contact uses the larger one of both bodies
   double roughness_m = 2e-6;         // rms height of the surface; used by the contact player only
   bool absent = false;               // not in the world until World::add()
 };
@@ -35,6 +36,7 @@ struct GroundSpec {
   double poisson_ratio = 0.2;
   double restitution = 0.5;
   double friction = 0.5;
+  double rolling_resistance = 1e-3;
   double density_kg_m3 = 2400.0;
   double roughness_m = 20e-6;  // as above; smooth trowelled concrete
 };

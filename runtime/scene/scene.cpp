@@ -152,6 +152,7 @@ const base::Keys<physics::GroundSpec> kGround{
     {"density_kg_m3", &physics::GroundSpec::density_kg_m3, Limits{1, 3e4}, "density"},
     {"restitution", &physics::GroundSpec::restitution, Limits{0, 1}, "as of a body"},
     {"friction", &physics::GroundSpec::friction, Limits{0, 10}, "as of a body"},
+    {"rolling_resistance", &physics::GroundSpec::rolling_resistance, Limits{0, 1}, "as of a body"},
     {"roughness_m", &physics::GroundSpec::roughness_m, Limits{0, kRoughestM}, "as of a body"}};
 const base::Keys<Scene> kReflection{{"reflection", &Scene::reflection, Limits{0, 1}, "reflected share of the pressure"}};
 const base::Keys<SceneListener> kListener{

@@ -43,6 +43,8 @@ const base::Keys<physics::BodySpec> kMotion{
     {"restitution", &physics::BodySpec::restitution, Limits{0, 1},
      "upper limit of the rebound: ringing bodies may keep more. Contacts use the geometric mean of both bodies"},
     {"friction", &physics::BodySpec::friction, Limits{0, 10}, "Coulomb coefficient. Contacts use the geometric mean of both bodies"},
+    {"rolling_resistance", &physics::BodySpec::rolling_resistance, Limits{0, 1},
+     "couple that resists rolling, over radius times load; larger on soft or rough surfaces. Contacts use the larger one of both bodies"},
     {"roughness_m", &physics::BodySpec::roughness_m, Limits{0, kRoughestM}, "rms height of the surface ([Roughness](#roughness))"}};
 const base::Keys<SceneSurface> kSurface{
     {"recording", "required", "the file; bodies may share one"},

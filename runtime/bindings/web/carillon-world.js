@@ -8,14 +8,14 @@
 // SI units, as in carillon-audio.js. The world is simulated on a worker, look_ahead_s ahead of the sound: actions are heard that much
 // later. Invalid arguments reject with an Error of one sentence.
 
-const kGround = { height_m: 0, young_modulus_pa: 30e9, poisson_ratio: 0.2, restitution: 0.5, friction: 0.5, density_kg_m3: 2400, roughness_m: 20e-6 };
+const kGround = { height_m: 0, young_modulus_pa: 30e9, poisson_ratio: 0.2, restitution: 0.5, friction: 0.5, rolling_resistance: 1e-3, density_kg_m3: 2400, roughness_m: 20e-6 };
 const kStill = [0, 0, 0], kKept = 4096; // poses of a body that wait to be asked for
 const kKeys = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1] };
 
 export class World {
   /**
    * bodies: [{body, bank: bytes of its bank, fixed, absent, velocity_m_s, angular_velocity_rad_s, restitution (0.5), friction (0.4),
-   * roughness_m}]; each body of the audio starts where it was added. ground: keys of kGround, or null: none. modes: impacts include modes
+   * rolling_resistance (0.001), roughness_m}]; each body of the audio starts where it was added. ground: keys of kGround, or null: none. modes: impacts include modes
    * while the physics is ahead of the sound. masking: inaudible hits are omitted. moved: called after new poses.
    */
   static async open(audio, { bodies, ground = {}, gravity_m_s2 = [0, 0, -9.81], look_ahead_s = 0.1, modes = true, masking = true, moved = () => {} }) {
@@ -28,8 +28,9 @@ export class World {
       const { position_m, rotation } = body.spec;
       world.numbers.set(body, n);
       if (!banks.some(({ bytes }) => bytes === bank)) banks.push({ bytes: bank, name: body.bank.name });
-      const { velocity_m_s = kStill, angular_velocity_rad_s = kStill, restitution = 0.5, friction = 0.4, roughness_m = 2e-6, fixed = false, absent = false } = more;
-      const numbers = [...position_m, ...rotation, ...velocity_m_s, ...angular_velocity_rad_s, restitution, friction, roughness_m, +fixed, +absent];
+      const { velocity_m_s = kStill, angular_velocity_rad_s = kStill, restitution = 0.5, friction = 0.4, rolling_resistance = 1e-3, roughness_m = 2e-6 } = more;
+      const { fixed = false, absent = false } = more;
+      const numbers = [...position_m, ...rotation, ...velocity_m_s, ...angular_velocity_rad_s, restitution, friction, rolling_resistance, roughness_m, +fixed, +absent];
       return { bank: banks.findIndex(({ bytes }) => bytes === bank), name: body.name, numbers, number: body.number };
     });
     const floor = { ...kGround, ...ground }, row = [...gravity_m_s2, +(ground !== null), ...Object.keys(kGround).map((key) => floor[key]), +modes, +masking];

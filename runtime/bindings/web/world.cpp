@@ -44,6 +44,7 @@ int PageWorld::add_body(int bank, std::span<const double> numbers, const std::st
   body.angular_velocity_rad_s = row.take_vector();
   body.restitution = row.take();
   body.friction = row.take();
+  body.rolling_resistance = row.take();
   body.roughness_m = row.take();
   body.fixed = row.take() != 0.0;
   body.absent = row.take() != 0.0;
@@ -57,7 +58,7 @@ void PageWorld::start(std::span<const double> numbers) {
   const bool has_ground = row.take() != 0.0;
   physics::GroundSpec ground;
   for (double* number : {&ground.height_m, &ground.young_modulus_pa, &ground.poisson_ratio, &ground.restitution, &ground.friction,
-                         &ground.density_kg_m3, &ground.roughness_m})
+                         &ground.rolling_resistance, &ground.density_kg_m3, &ground.roughness_m})
     *number = row.take();
   if (has_ground) spec_.ground = ground;
   physics::WorldOptions options;

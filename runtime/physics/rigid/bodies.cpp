@@ -21,6 +21,7 @@ Bodies::Bodies(std::vector<Solid> solids, std::vector<State> states, std::option
   in_impact_.assign(solids_.size(), 0);
   struck_s_.assign(solids_.size(), -1.0);
   swings_m_.assign(solids_.size(), 0.0);
+  settling_.assign(solids_.size(), 1.0);
   for (int i = 0; i < count(); ++i) placed_[i] = rigid::place(solids_[i], states_[i]);
   make_articulations(joints);
 }
@@ -33,6 +34,7 @@ void Bodies::append(Solid solid, const State& state) {
   in_impact_.push_back(0);
   struck_s_.push_back(-1.0);
   swings_m_.push_back(0.0);
+  settling_.push_back(1.0);
   if (!articulation_of_.empty()) articulation_of_.push_back(-1), member_.push_back(-1);
   note_pulls();
   for (BodyTable* table : tables_) table->resize(count());
@@ -155,6 +157,10 @@ void Bodies::note_pulls() {
 
 double Bodies::calc_friction(int a, int b) const {
   return std::sqrt(solids_[a].friction * (b >= 0 ? solids_[b].friction : ground_->friction));
+}
+
+double Bodies::calc_rolling_resistance(int a, int b) const {
+  return std::max(solids_[a].rolling_resistance, b >= 0 ? solids_[b].rolling_resistance : ground_->rolling_resistance);
 }
 
 double Bodies::calc_restitution(int a, int b) const {

@@ -19,6 +19,7 @@ struct Ground {
   double height_m = 0.0;
   double restitution = 0.5, friction = 0.5;
   double young_modulus_pa = 0.0, poisson_ratio = 0.0;
+  double rolling_resistance = 1e-3;
 };
 
 /// Bodies on joints, moved in joint coordinates (runtime/physics/joints).
@@ -134,6 +135,7 @@ class Bodies {
 
   // Of two touching bodies, or of one and the ground:
   double calc_friction(int a, int b) const;
+  double calc_rolling_resistance(int a, int b) const;
   double calc_restitution(int a, int b) const;
   double calc_size(int a, int b) const;        // of the smaller one [m]
   double calc_thickness(int a, int b) const;   // of the thinner one [m]
@@ -152,6 +154,10 @@ class Bodies {
   void drop_grab(int body);
   /// Bound of the acceleration of any point by a grab of the body or of its articulation [m/s^2]; 0: not grabbed.
   double get_pull(int body) const { return grabs_.empty() || body < 0 ? 0.0 : pulls_m_s2_[body]; }
+
+  /// Factor of the couples that resist rolling and drilling on a body that swings in place; 1 elsewhere (Rest::note_swings).
+  double get_settling(int body) const { return body < 0 ? 1.0 : settling_[body]; }
+  void set_settling(int body, double factor) { settling_[body] = factor; }
 
   std::vector<Articulation>& articulations() { return articulations_; }
   const std::vector<Articulation>& articulations() const { return articulations_; }
@@ -211,6 +217,7 @@ class Bodies {
   std::vector<double> struck_s_;
   std::vector<double> swings_m_;
   std::vector<Grab> grabs_;
+  std::vector<double> settling_;    // of the bodies
   std::vector<double> pulls_m_s2_;  // of the bodies; empty without grabs
   std::optional<Ground> ground_;
   Vec3 gravity_{};

@@ -32,7 +32,7 @@ struct Solid {
   Mat3 inertia_kg_m2{};  // about the centre, axes of the mesh
   Mat3 inverse_inertia{};
   double radius_m = 0.0;  // of a ball about the centre that encloses the body
-  double restitution = 0.5, friction = 0.4;
+  double restitution = 0.5, friction = 0.4, rolling_resistance = 1e-3;
   double young_modulus_pa = 0.0, poisson_ratio = 0.0;
   std::shared_ptr<const impact::Modes> modes;                   // null: no modes
   double max_bend_m = std::numeric_limits<double>::infinity();  // of soft bodies: blows that bend them farther are rigid

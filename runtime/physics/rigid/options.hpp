@@ -12,7 +12,6 @@ struct Options {
   int max_direct = 3;                           // maximum bodies of a group factorised in every step
   bool islands = true;                          // false: all bodies in one problem, for comparison
   int max_settling = 200;                       // the same for a group that is coming to rest
-  double rolling_resistance = 1e-3;             // c: rolling resistance couple c R F of hard materials
   double joint_tolerance = joints::kTolerance;  // per integration step of a mechanism's free motion [rad, m]
 };
 

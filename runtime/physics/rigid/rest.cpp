@@ -6,6 +6,7 @@
 #include "runtime/physics/rigid/rest.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <utility>
@@ -22,6 +23,17 @@ constexpr double kNeighbourSlowS = 0.05;   // s; and of the bodies that it touch
 constexpr double kMaxTouchSpeedMS = 5e-4;  // m/s; with no faster contact
 constexpr double kStillM = 5e-5;           // m; a body stays in place while no point moves farther
 constexpr double kWakeForceRatio = 0.05;   // fraction of the weight: change of the forces that wakes a body
+constexpr double kSwingRatio = 0.2;        // of the radius of a body: what moves no farther swings in place;
+constexpr double kSwingDelayS = 0.5;       // s; after this time the rolling resistance of a body on others grows;
+constexpr double kSettlingPerS = 20.0;     // the growth, as a multiple per s,
+constexpr double kMaxSettling = 30.0;      // up to this one
+
+/// Upper bound of the distance of any point of a body between two poses [m].
+double calc_distance(const Solid& solid, const State& a, const State& b) {
+  double same = 0.0;
+  for (int k = 0; k < 4; ++k) same += a.rotation[k] * b.rotation[k];
+  return norm(a.centre - b.centre) + 2.0 * std::sqrt(std::max(0.0, 1.0 - same * same)) * solid.radius_m;
+}
 
 }  // namespace
 
@@ -42,15 +54,36 @@ bool Rest::may_sleep(const std::vector<int>& bodies, double time_s) {
 
 void Rest::note_still() {
   for (int i = 0; i < bodies_.count(); ++i) {
+    Pace& pace = paces_[i];
+    if (!bodies_.moves(i) || calc_distance(bodies_.solid(i), bodies_.state(i), pace.anchor) <= kStillM) continue;
+    pace.anchor = bodies_.state(i);
+    pace.anchored_s = bodies_.get_time();
+  }
+}
+
+void Rest::note_swings() {
+  constexpr int kNone = -2, kMany = -3;
+  std::vector<int> supports(bodies_.count(), kNone);  // of each body: the static one (-1: ground), or kMany, also for a moving one
+  for (const Pair* pair : windows_.near()) {
+    if (pair->cord >= 0 || !pair->touches()) continue;
+    for (const bool is_a : {true, false}) {
+      const int body = is_a ? pair->a : pair->b, other = is_a ? pair->b : pair->a;
+      if (body < 0) continue;
+      const bool is_static = other < 0 || bodies_.solid(other).fixed;
+      supports[body] = is_static && (supports[body] == kNone || supports[body] == other) ? other : kMany;
+    }
+  }
+  const double now_s = bodies_.get_time();
+  for (int i = 0; i < bodies_.count(); ++i) {
     if (!bodies_.moves(i)) continue;
     Pace& pace = paces_[i];
-    const State& now = bodies_.state(i);
-    double same = 0.0;
-    for (int k = 0; k < 4; ++k) same += now.rotation[k] * pace.anchor.rotation[k];
-    const double turned = 2.0 * std::sqrt(std::max(0.0, 1.0 - same * same));
-    if (norm(now.centre - pace.anchor.centre) + turned * bodies_.solid(i).radius_m <= kStillM) continue;
-    pace.anchor = now;
-    pace.anchored_s = bodies_.get_time();
+    const bool swings = supports[i] == kMany && bodies_.get_pull(i) == 0.0 && bodies_.find_articulation(i) == nullptr &&
+                        calc_distance(bodies_.solid(i), bodies_.state(i), pace.swing) <= kSwingRatio * bodies_.solid(i).radius_m;
+    if (!swings) {
+      pace.swing = bodies_.state(i);
+      pace.swings_s = now_s;
+    }
+    bodies_.set_settling(i, std::clamp(1.0 + kSettlingPerS * (now_s - pace.swings_s - kSwingDelayS), 1.0, kMaxSettling));
   }
 }
 
@@ -240,6 +273,7 @@ std::vector<int> Rest::wake(int body, int by, bool alone) {
     bodies_.set_asleep(i, false);
     awake.push_back(i);
     paces_[i].slow_s = 0.0;
+    paces_[i].swings_s = bodies_.get_time();
     // Waking is no motion: to sleep again the body must stay in place for kSleepDelayS only.
     paces_[i].anchored_s = std::max(paces_[i].anchored_s, bodies_.get_time() + kSleepDelayS - kLongSlowS);
     windows_.wake(i, by);

@@ -33,6 +33,8 @@ class Rest {
   bool try_island(Island& island, double step_s) { return try_sleep(island, step_s, {}) != Balance::none; }
   /// Updates how long each body has stayed in place. Call at the start of a window.
   void note_still();
+  /// Updates the resistance of bodies that swing in place on others. Call at the start of a window.
+  void note_swings();
   /// Puts an island to sleep whose bodies have stayed in place, without proof of balance. True if it sleeps.
   bool try_still(Island& island, double step_s);
   /// Puts bodies to sleep whose island keeps moving elsewhere. Call at the start of a window; uses the contacts of the last step.
@@ -59,6 +61,8 @@ class Rest {
     double next_part_s = 0.0;   // that of a part of its island
     State anchor;               // pose at which it has stayed in place
     double anchored_s = 0.0;    // since this time
+    State swing;                // pose about which it swings,
+    double swings_s = 0.0;      // since this time
   };
   enum class Balance { none, stands, leans };  // leans: only with the forces of others
 

@@ -19,6 +19,8 @@ constexpr int kMaxMissed = 30;            // per step: instants at which no touc
 constexpr int kMaxSought = 3;             // of these, with a search for closings on the path
 constexpr int kMaxCompleted = 4;          // repeated solutions of a step with missing touches added
 constexpr int kMaxShortened = 8;          // times that a step without impacts is shortened
+constexpr int kMaxHalved = 3;             // times that a step without impacts is halved, in which a body would become
+constexpr double kMaxAheadM = 5e-5;       // m; deeper than this: touches of fast turning bodies are not linear
 constexpr int kMaxImpacts = 4;            // individual impacts of an island per step; an island with more is crowded
 constexpr int kMinImpacts = 2;            // the same for the largest islands, whose impacts cost more
 constexpr int kMaxStruckBodies = 48;      // bodies of an island times its impacts per step
@@ -88,6 +90,7 @@ void Space::step(double end_s) {
 
 void Space::open_window(double end_s) {
   rest_.note_still();
+  rest_.note_swings();
   if (options_.islands) rest_.try_parts();
   windows_.open(end_s, modal_impacts_.list());
   rest_.reset(windows_.fly_bodies());
@@ -123,12 +126,15 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     modal_impacts_.follow(step_, h, touches_);
     if ((may_sleep && try_rest(island, h)) || (begins && rest_.try_still(island, h))) break;
     touches_.forget_closing(step_);
+    double depth_m = 0.0;     // at the end of the step
     const auto solve = [&] {  // true: touches were missing
       for (int n = 0; n <= kMaxCompleted; ++n) {
         problem_.predict(step_, h, false);
         problem_.make_points(step_, impacts < max_impacts);
         problem_.solve(step_);
-        if (!touches_.complete(step_, missed < kMaxSought)) return n > 0;
+        const TouchSets::Ahead ahead = touches_.complete(step_, missed < kMaxSought);
+        depth_m = ahead.depth_m;
+        if (!ahead.was_missing) return n > 0;
       }
       return true;
     };
@@ -140,6 +146,10 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       const double stops_s = instants_.calc_stopping_time(step_);
       if (stops_s >= h) break;
       h = stops_s;
+      solve();
+    }
+    for (int n = 0; n < kMaxHalved && impacts >= max_impacts && depth_m > kMaxAheadM; ++n) {
+      h *= 0.5;
       solve();
     }
     double at = h;

@@ -257,29 +257,30 @@ std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const geometry::Fr
   return least;
 }
 
-/// Adds the deepest point of a pair at the frames `a` and `b`, `closing_s` later (0: unused), if it is deeper than all touches. True for an
-/// addition, and for a closing deepest touch.
-bool TouchSets::complete(Pair& pair, const geometry::Frame& a, const geometry::Frame& b, double closing_s) {
+/// Adds the deepest point of a pair at the frames `a` and `b`, `closing_s` later (0: unused), if it is deeper than all touches.
+TouchSets::Ahead TouchSets::complete(Pair& pair, const geometry::Frame& a, const geometry::Frame& b, double closing_s) {
   const geometry::Shape& mine = *bodies_.get_shape(pair.a);
   const geometry::Shape* theirs = bodies_.get_shape(pair.b);
   geometry::Deepest deepest;
   if (theirs == nullptr) {
-    if (calc_least_gap(pair, mine, a) >= -kMissingDepthM) return false;
+    if (calc_least_gap(pair, mine, a) >= -kMissingDepthM) return {};
     deepest = geometry::find_lowest(mine, a, bodies_.ground()->height_m);
     pair.measured = a;
     pair.lowest_m = deepest.gap_m;
-    if (deepest.gap_m - mine.get_sag_m() >= -kMissingDepthM) return false;  // no touch is deeper either
+    if (deepest.gap_m - mine.get_sag_m() >= -kMissingDepthM) return {};  // no touch is deeper either
   } else {
     deepest = geometry::find_deepest(mine, move(a, pair.apart_m), *theirs, b, -kMissingDepthM, pair.memory);
-    if (deepest.gap_m >= -kMissingDepthM) return false;
+    if (deepest.gap_m >= -kMissingDepthM) return {};
   }
+  const double depth_m = -deepest.gap_m - (pair.b < 0 ? calc_explained_depth(pair) : 0.0);
   const auto [lowest, least_m] = find_least(pair, a, b);
-  if (deepest.gap_m < std::min(least_m, 0.0) - kMissingDepthM) return add(pair, deepest), true;
+  if (deepest.gap_m < std::min(least_m, 0.0) - kMissingDepthM) return add(pair, deepest), Ahead{true, depth_m};
   if (lowest == nullptr || lowest->is_closed() || lowest->touch.gap_m <= kTouchGapM || least_m > -kMissingDepthM || lowest->rests ||
       !(closing_s > 0.0))
-    return false;
+    return {false, depth_m};
   lowest->touching = false;
-  return std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - least_m)) < 0.0;
+  const bool closes = std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - least_m)) < 0.0;
+  return {closes, depth_m};
 }
 
 /// Adds the touch of a point at the current poses.
@@ -308,7 +309,7 @@ void TouchSets::forget_closing(const Step& step) const {
     for (Contact& c : pair->contacts) c.closes_s = -1.0;
 }
 
-bool TouchSets::complete(const Step& step, bool finds_closing) {
+TouchSets::Ahead TouchSets::complete(const Step& step, bool finds_closing) {
   std::vector<geometry::Frame> then;
   for (int n = 0; n < step.count(); ++n) {
     const int i = step.body(n);
@@ -318,16 +319,17 @@ bool TouchSets::complete(const Step& step, bool finds_closing) {
     const int n = step.find(body);
     return n < 0 ? bodies_.get_frame(body) : then[n];
   };
-  bool any = false;
+  Ahead ahead;
   for (Pair* pair : step.island().pairs) {
     if (pair->cord >= 0 || !step.has(*pair) || bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b)) continue;
-    const std::size_t found = pair->contacts.size();
-    if (complete(*pair, get_then(pair->a), get_then(pair->b), finds_closing ? step.length_s : 0.0)) any = true;
-    if (pair->contacts.size() == found || bodies_.get_time() < pair->next_search_s) continue;
+    const std::size_t before = pair->contacts.size();
+    const Ahead found = complete(*pair, get_then(pair->a), get_then(pair->b), finds_closing ? step.length_s : 0.0);
+    ahead = {ahead.was_missing || found.was_missing, std::max(ahead.depth_m, found.depth_m)};
+    if (pair->contacts.size() == before || bodies_.get_time() < pair->next_search_s) continue;
     pair->searched = pair->memory.known = false;  // a lying body has more touches
     pair->next_search_s = bodies_.get_time() + kSearchIntervalS;
   }
-  return any;
+  return ahead;
 }
 
 geometry::Frame TouchSets::find_flown(int body, double time_s) const {
@@ -337,7 +339,7 @@ geometry::Frame TouchSets::find_flown(int body, double time_s) const {
 
 void TouchSets::complete_in_flight(Pair& pair, double time_s) {
   const geometry::Frame a = find_flown(pair.a, time_s), b = find_flown(pair.b, time_s);
-  for (int n = 0; n < kMaxAdded && complete(pair, a, b, 0.0); ++n) {
+  for (int n = 0; n < kMaxAdded && complete(pair, a, b, 0.0).was_missing; ++n) {
   }
 }
 

@@ -46,9 +46,13 @@ class TouchSets {
   void update(Pair& pair, double step_s);
   /// Resets the closing times of the contacts of a step.
   void forget_closing(const Step& step) const;
-  /// Adds touches that are missing at the end of a step by its predicted motion, and with `finds_closing` finds those that close. True if
-  /// there were any.
-  bool complete(const Step& step, bool finds_closing);
+  /// Touches at the end of a step.
+  struct Ahead {
+    bool was_missing = false;  // any touch, or with `finds_closing` one that closes
+    double depth_m = 0.0;      // of the deepest point of any pair, beyond what springs and modes explain
+  };
+  /// Adds touches that are missing at the end of a step by its predicted motion, and with `finds_closing` finds those that close.
+  Ahead complete(const Step& step, bool finds_closing);
   /// Like complete(), for a pair in a modal impact, by free flight.
   void complete_in_flight(Pair& pair, double time_s);
   /// Closing point of a touch of a curved surface within a time of free flight, moved back with the bodies.
@@ -82,7 +86,7 @@ class TouchSets {
   void lose_all(Pair& pair) const;
   void limit_apart(Pair& pair) const;
   std::pair<Contact*, double> find_least(Pair& pair, const geometry::Frame& a, const geometry::Frame& b) const;
-  bool complete(Pair& pair, const geometry::Frame& a, const geometry::Frame& b, double closing_s);
+  Ahead complete(Pair& pair, const geometry::Frame& a, const geometry::Frame& b, double closing_s);
   geometry::Frame find_flown(int body, double time_s) const;
   void add(Pair& pair, const geometry::Deepest& deepest);
 

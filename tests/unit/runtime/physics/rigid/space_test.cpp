@@ -132,6 +132,7 @@ TEST(space, steady_precession_of_disc) {
     }
     disc.restitution = 0.0;
     disc.friction = 0.8;
+    disc.rolling_resistance = 0.0;
     disc.young_modulus_pa = 200e9;
     State start;
     start.rotation = {std::cos(0.5 * a), std::sin(0.5 * a), 0, 0};
@@ -139,7 +140,7 @@ TEST(space, steady_precession_of_disc) {
     const Mat3 rotation = make_rotation(start.rotation);
     const Vec3 spin = -rate * s * (Vec3{0, -c, -s} - (d.e / d.radius) * Vec3{0, -s, c});
     start.momentum = rotation * (disc.inertia_kg_m2 * (transpose(rotation) * spin));
-    Space space({disc}, {start}, Ground{0.0, 0.0, 0.8, 200e9, 0.3}, {0, 0, -gravity}, {.rolling_resistance = 0.0});
+    Space space({disc}, {start}, Ground{0.0, 0.0, 0.8, 200e9, 0.3, 0.0}, {0, 0, -gravity}, {});
     double turned = 0.0, before = -0.5 * M_PI, lowest_m = start.centre[2];
     while (space.get_time() < d.end_s - 1e-9) {
       space.step(d.end_s);
