@@ -17,9 +17,9 @@
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
 #include "runtime/exchange/faust.hpp"
-#include "runtime/exchange/frd.hpp"
 #include "runtime/exchange/glb.hpp"
 #include "runtime/exchange/sofa.hpp"
+#include "runtime/exchange/solved_model.hpp"
 #include "runtime/material/table.hpp"
 
 namespace carillon::exchange {
@@ -27,22 +27,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kMaxGlbBytes = 1ULL << 32, kMaxFrdBytes = 1ULL << 36;
+constexpr std::uint64_t kMaxGlbBytes = 1ULL << 32, kMaxResultBytes = 1ULL << 36;
 
-bank::Bank import_frd(const ImportWishes& wishes, const material::Material* material, std::vector<std::string>& notes) {
+bool has_results(const fs::path& file) {
+  const std::string ending = base::find_extension(file);
+  return ending == ".frd" || ending == ".unv" || ending == ".uff";
+}
+
+bank::Bank import_results(const ImportWishes& wishes, const material::Material* material, std::vector<std::string>& notes) {
   if (material == nullptr)
     throw InputError(
-        fmt::format("{}: results of CalculiX name no density and no damping; add --material NAME (`carillon materials` lists them)",
+        fmt::format("{}: modes of another solver name no density and no damping; add --material NAME (`carillon materials` lists them)",
                     wishes.file.string()));
   if (wishes.model || wishes.is_plain) throw InputError("--model and --plain are for glTF files; leave them out");
-  const FrdReading reading{.material = material,
-                           .units = wishes.unit == "mm-t-s" ? FrdUnits::kMillimetre : FrdUnits::kMetre,
-                           .are_units_given = !wishes.unit.empty()};
-  return parse_frd(base::read_file(wishes.file, "file of results", kMaxFrdBytes), wishes.file.string(), reading, &notes);
+  const ResultsReading reading{.material = material,
+                               .units = wishes.unit == "mm-t-s" ? ModelUnits::kMillimetre : ModelUnits::kMetre,
+                               .are_units_given = !wishes.unit.empty()};
+  const std::string name = wishes.file.string(), bytes = base::read_file(wishes.file, "file of results", kMaxResultBytes);
+  return make_bank(base::find_extension(wishes.file) == ".frd" ? parse_frd(bytes, name) : parse_unv(bytes, name), name, reading, &notes);
 }
 
 bank::Bank import_glb(const ImportWishes& wishes, const material::Material* material, std::vector<std::string>& notes) {
-  if (!wishes.unit.empty()) throw InputError("--unit is for .frd files; glTF is in metres");
+  if (!wishes.unit.empty()) throw InputError("--unit is for modes of other solvers; glTF is in metres");
   const GlbReading reading{.model = wishes.model, .ignores_extras = wishes.is_plain, .material = material};
   return parse_glb(base::read_file(wishes.file, "GLB or glTF file", kMaxGlbBytes), wishes.file.string(), reading, &notes);
 }
@@ -182,8 +188,7 @@ void run_import(const ImportWishes& wishes) {
   const material::Material* const material =
       wishes.material.empty() ? nullptr : &material::MaterialTable::get().require("--material", wishes.material).material;
   std::vector<std::string> notes;
-  const bank::Bank bank =
-      base::find_extension(wishes.file) == ".frd" ? import_frd(wishes, material, notes) : import_glb(wishes, material, notes);
+  const bank::Bank bank = has_results(wishes.file) ? import_results(wishes, material, notes) : import_glb(wishes, material, notes);
   for (const std::string& note : notes) fmt::print(stderr, "carillon-bank: note: {}: {}\n", base::printable(wishes.file.string()), note);
   if (base::is_standard_output(wishes.out)) {
     base::check_standard_output("bank");

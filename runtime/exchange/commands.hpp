@@ -27,13 +27,13 @@ void run_export(const ExportWishes& wishes);
 
 struct ImportWishes {
   std::filesystem::path file, out;
-  std::string unit;  // of .frd: "m-kg-s", "mm-t-s"; empty: not given
+  std::string unit;  // of modes of other solvers: "m-kg-s", "mm-t-s"; empty: not given
   std::optional<std::size_t> model;
   std::string material;
   bool is_plain = false;
 };
 
-/// Imports a GLB or .frd file as a bank. Throws InputError.
+/// Imports a GLB file, or modes of another solver, as a bank. Throws InputError.
 void run_import(const ImportWishes& wishes);
 
 }  // namespace carillon::exchange

@@ -229,12 +229,16 @@ void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
 }
 
 void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
-  app.add_option("FILE", wishes.file, "GLB or glTF file (.glb, .gltf with its buffers), or modes of CalculiX (.frd)")->required();
+  app.add_option("FILE", wishes.file,
+                 "GLB or glTF file (.glb, .gltf with its buffers), or modes of CalculiX (.frd) or in a universal file (.unv, .uff)")
+      ->required();
   app.add_option("-o,--output", wishes.out, "Output bank; -: standard output")->required();
   app.add_option("--model", wishes.model, "Index of the modal model in the file, from 0")
       ->check(base::whole_range(0, kMost), base::describe_whole_range(0, kMost));
-  app.add_option("--material", wishes.material, "Material name (carillon materials) for a model without one, and for .frd");
-  app.add_option("--unit", wishes.unit, "Units of a .frd file, m-kg-s or mm-t-s; default: the former, for bodies of at most 10 m")
+  app.add_option("--material", wishes.material,
+                 "Material name (carillon materials) for a model without one, and for modes of other solvers");
+  app.add_option("--unit", wishes.unit,
+                 "Units of modes of other solvers, m-kg-s or mm-t-s; default: the former, for bodies of at most 10 m")
       ->check(CLI::IsMember({"m-kg-s", "mm-t-s"}));
   app.add_flag("--plain", wishes.is_plain, "Read only the extension, ignoring the extras of carillon-bank export");
 }
@@ -345,9 +349,9 @@ void add_commands(CLI::App& app, Options& options) {
           "Exports to GLB (mesh and modes, KHR_audio_rigid_bodies), Faust (the loudest modes at a few points) or SOFA (directivity)"),
       options.exported);
   add_import(
-      *app.add_subcommand(
-          "import",
-          "Imports a GLB or glTF file with KHR_audio_rigid_bodies as a bank, lossless for exported files; or modes of CalculiX (.frd)"),
+      *app.add_subcommand("import",
+                          "Imports a GLB or glTF file with KHR_audio_rigid_bodies as a bank, lossless for exported files; or modes of "
+                          "other solvers (.frd, .unv, .uff)"),
       options.imported);
 }
 

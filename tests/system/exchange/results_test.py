@@ -1,8 +1,9 @@
 #!/usr/bin/python3
-"""Modes of CalculiX as a bank: a bar by ccx, imported, against our own solve of the same mesh: frequencies within 0.5 cents, the rendered
-level within 0.01 dB; one bank from metres and from millimetres; damaged and cut files are named.
+"""Modes of other solvers as a bank: a bar by ccx, imported, against our own solve of the same mesh: frequencies within 0.5 cents, the
+rendered level within 0.01 dB; one bank from metres and from millimetres; the same modes in a universal file, with masses and damping of
+their own; damaged and cut files are named.
 
-usage: frd_test.py BIN_DIR
+usage: results_test.py BIN_DIR
 """
 import json
 import math
@@ -15,6 +16,9 @@ import tempfile
 import h5py
 import meshio
 import numpy
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "path"))
+import cae
 
 BIN = pathlib.Path(sys.argv[1]).resolve()
 YOUNG, POISSON, DENSITY = 210e9, 0.3, 7850.0
@@ -93,6 +97,60 @@ def check_comparison(folder):
     assert "twice.hdf" in said and "same size" in said, said
 
 
+def write_unv_modes(path, nodes, tets, modes, mass, viscous, hysteretic, last=3):
+    """Datasets 55 of modes (frequency, displacement by node), shapes times the root of their modal mass, after the mesh."""
+    text = cae.format_unv(nodes, tets)
+    for k, (freq, shape) in enumerate(modes, 1):
+        text += "    -1\n    55\n" + f"mode {k}\nNONE\nNONE\nNONE\nNONE\n" + "%10d" * 6 % (1, 2, last, 8, 2, 3 if last == 2 else 6) + "\n"
+        text += "%10d" * 4 % (2, 4, 1, k) + "\n" + "%13.5E" * 4 % (freq, mass, viscous, hysteretic) + "\n"
+        for node, u in sorted(shape.items()):
+            values = [x * math.sqrt(mass) for x in u] + ([] if last == 2 else [0.1, 0.2, 0.3])
+            text += "%10d\n" % node + "%13.5E" * len(values) % tuple(values) + "\n"
+        text += "    -1\n"
+    path.write_text(text)
+
+
+def check_universal(folder, nodes, tets):
+    points, modes = cae.read_frd(folder / "m.frd")
+    expected = read_bank(folder / "m.hdf")
+    levels = measure_levels(folder, "m.hdf", expected[0])
+    for name, mass, viscous, hysteretic, last in ("a.unv", 4.0, 0.0, 0.0, 2), ("b.uff", 0.25, 1e-4, 2e-4, 3):
+        write_unv_modes(folder / name, nodes, tets, modes, mass, viscous, hysteretic, last)
+        run(folder, BIN / "carillon-bank", "import", name, "--material", "ccx steel", "-o", "unv.hdf")
+        run(folder, BIN / "carillon-bank", "check", "unv.hdf")
+        found = read_bank(folder / "unv.hdf")
+        assert abs(1200 * numpy.log2(found[0] / expected[0])).max() < 0.02, name  # six digits
+        with h5py.File(folder / "unv.hdf") as bank, h5py.File(folder / "m.hdf") as other:
+            decay = bank["modes/decay"][:]
+            wanted = (viscous + hysteretic / 2) * 2 * math.pi * found[0] if viscous else other["modes/decay"][:]
+            assert abs(decay / wanted - 1).max() < 1e-9, name
+        if viscous == 0:
+            differ = abs(measure_levels(folder, "unv.hdf", found[0]) - levels)[levels > levels.max() - 60]
+            assert differ.max() < 0.01, differ
+    assert "imported from a universal file" in run(folder, BIN / "carillon-bank", "info", "unv.hdf")
+    text = (folder / "b.uff").read_text()
+    first = text.index("    55\n")
+    damages = {
+        "complex": (text.replace("%10d" * 6 % (1, 2, 3, 8, 2, 6), "%10d" * 6 % (1, 3, 3, 8, 5, 6), 1), "complex modes"),
+        "no_mass": (text.replace("%13.5E" % 0.25, "%13.5E" % 0, 1), "modal mass"),
+        "no_mesh": (text[text.index("    -1\n    55\n") :], "before the nodes"),
+        "no_modes": (text[: text.index("    -1\n    55\n")], "no modes"),
+        "text": ("a letter\n" + text, "universal file"),
+        "lost": (text[:first] + text[first:].replace("%10d\n" % 2, "%10d\n" % 999999, 1), "node 999999"),
+        "hexahedron": (text.replace("%10d%10d" % (1, 118), "%10d%10d" % (1, 115), 1), "only tetrahedra"),
+    }
+    for name, (data, words) in damages.items():
+        (folder / f"{name}.unv").write_text(data)
+        said = run(folder, BIN / "carillon-bank", "import", f"{name}.unv", "--material", "ccx steel", "-o", "x.hdf", code=2)
+        assert words in said and f"{name}.unv" in said, f"{name}: {said}"
+    for cut in range(200, len(text) - 8, len(text) // 30):
+        if text[:cut].endswith("    -1\n"):
+            continue  # whole datasets
+        (folder / "cut.unv").write_text(text[:cut])
+        said = run(folder, BIN / "carillon-bank", "import", "cut.unv", "--material", "ccx steel", "-o", "x.hdf", code=2)
+        assert "cut.unv" in said, f"{cut}: {said}"
+
+
 def check_refusals(folder):
     text = (folder / "m.frd").read_bytes()
     said = run(folder, BIN / "carillon-bank", "import", "m.frd", "-o", "x.hdf", code=2)
@@ -166,6 +224,7 @@ def main():
             assert is_heard.sum() >= 5 and differ.max() < 0.01, f"{bank}: {differ} dB"
         print(f"{cents:.3f} cents, levels within {differ.max():.4f} dB")
         check_comparison(folder)
+        check_universal(folder, nodes, tets)
         check_refusals(folder)
 
 

@@ -1,0 +1,106 @@
+// Lines of fixed columns in files of results.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "runtime/base/failure.hpp"
+#include "runtime/base/printable.hpp"
+#include "runtime/base/vector.hpp"
+
+namespace carillon::exchange {
+
+inline constexpr std::size_t kMaxResultNodes = 50'000'000, kMaxResultModes = 40'000;
+
+/// Reads lines and their columns. Errors are InputError "name:line: ...".
+class ResultsLines {
+ public:
+  ResultsLines(std::string_view bytes, const std::string& name) : bytes_(bytes), name_(name) {}
+
+  bool is_at_end() const { return at_ >= bytes_.size(); }
+
+  template <class... Args>
+  [[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) const {
+    throw PlacedError(fmt::format("{}:{}", name_, line_number_), fmt::format(format, std::forward<Args>(args)...));
+  }
+
+  /// The next line, in `block` for the message at the end of the file.
+  std::string_view next(const char* block) {
+    if (is_at_end()) fail("the file ends within {}; it was cut short: write or copy it again", block);
+    const std::size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
+    std::string_view line = bytes_.substr(at_, end - at_);
+    at_ = end + 1;
+    ++line_number_;
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    return line;
+  }
+
+  /// Columns `begin` to `begin + width`, without blanks around them.
+  static std::string_view cut(std::string_view line, std::size_t begin, std::size_t width) {
+    std::string_view field = begin < line.size() ? line.substr(begin, width) : std::string_view();
+    while (!field.empty() && field.front() == ' ') field.remove_prefix(1);
+    while (!field.empty() && field.back() == ' ') field.remove_suffix(1);
+    return field;
+  }
+
+  /// A number in such columns; the exponent of a real number may be D.
+  template <class T>
+  T number(std::string_view line, std::size_t begin, std::size_t width, const char* what) const {
+    const std::string_view whole = cut(line, begin, width);
+    std::string field(whole);
+    if (field.size() > 1 && field[0] == '+') field.erase(0, 1);
+    if constexpr (std::is_floating_point_v<T>) std::replace(field.begin(), field.end(), 'D', 'E');
+    T value{};
+    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+    if (error != std::errc{} || end != field.data() + field.size())
+      fail("expected {}, found '{}'; the file is damaged: write it again", what, base::printable(std::string(whole)));
+    return value;
+  }
+
+  /// Three finite numbers.
+  Vec3 vector(std::string_view line, std::size_t begin, std::size_t width, const char* what) const {
+    Vec3 x{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      x[k] = number<double>(line, begin + width * k, width, what);
+      if (!std::isfinite(x[k])) fail("{} is not finite; correct the model and solve it again", what);
+    }
+    return x;
+  }
+
+ private:
+  std::string_view bytes_;
+  const std::string& name_;
+  std::size_t at_ = 0, line_number_ = 0;
+};
+
+/// Nodes by their numbers in the file.
+class ResultsNodes {
+ public:
+  explicit ResultsNodes(const ResultsLines& lines) : lines_(lines) {}
+
+  void add(std::int64_t tag, const Vec3& position, std::vector<Vec3>& nodes) {
+    if (nodes.size() >= kMaxResultNodes) lines_.fail("more than {} nodes", kMaxResultNodes);
+    if (!index_of_.try_emplace(tag, nodes.size()).second) lines_.fail("node {} is defined a second time; write the file again", tag);
+    nodes.push_back(position);
+  }
+  std::size_t find(std::int64_t tag) const {
+    const auto found = index_of_.find(tag);
+    if (found == index_of_.end()) lines_.fail("node {} is not among the nodes of the file; write it again", tag);
+    return found->second;
+  }
+
+ private:
+  const ResultsLines& lines_;
+  std::unordered_map<std::int64_t, std::size_t> index_of_;
+};
+
+}  // namespace carillon::exchange
