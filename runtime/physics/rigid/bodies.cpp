@@ -159,6 +159,11 @@ double Bodies::calc_friction(int a, int b) const {
   return std::sqrt(solids_[a].friction * (b >= 0 ? solids_[b].friction : ground_->friction));
 }
 
+double Bodies::calc_settling(int a, int b) const {
+  if (moves(a)) return moves(b) ? std::min(settling_[a], settling_[b]) : settling_[a];
+  return moves(b) ? settling_[b] : 1.0;
+}
+
 double Bodies::calc_rolling_resistance(int a, int b) const {
   return std::max(solids_[a].rolling_resistance, b >= 0 ? solids_[b].rolling_resistance : ground_->rolling_resistance);
 }

@@ -155,8 +155,8 @@ class Bodies {
   /// Bound of the acceleration of any point by a grab of the body or of its articulation [m/s^2]; 0: not grabbed.
   double get_pull(int body) const { return grabs_.empty() || body < 0 ? 0.0 : pulls_m_s2_[body]; }
 
-  /// Factor of the couples that resist rolling and drilling on a body that swings in place; 1 elsewhere (Rest::note_swings).
-  double get_settling(int body) const { return body < 0 ? 1.0 : settling_[body]; }
+  /// Factor of the couples that resist rolling and drilling of bodies that swing in place; 1 elsewhere (Rest::note_swings).
+  double calc_settling(int a, int b) const;
   void set_settling(int body, double factor) { settling_[body] = factor; }
 
   std::vector<Articulation>& articulations() { return articulations_; }

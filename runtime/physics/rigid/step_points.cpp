@@ -234,7 +234,7 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
   p.wanted = (speed + turning) * p.normal - beyond;
   const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
   if (t.smooth && (curvature > 0.0 || t.steepest_per_m * bodies_.calc_size(c.a, c.b) > 1.0)) {
-    const double settling = std::max(bodies_.get_settling(c.a), bodies_.get_settling(c.b));
+    const double settling = bodies_.calc_settling(c.a, c.b);
     p.rolling_m = settling * bodies_.calc_rolling_resistance(c.a, c.b) * calc_rolling_radius(step, p, c, moved);
     p.twisting_m = settling * kTwistArmRatio * p.friction * calc_patch_radius(c);
   }
