@@ -9,7 +9,7 @@ import numpy as np
 FRICTION, RESTITUTION = 0.4, 0.5  # of every body
 CHAOTIC = ("box", "tube", "two", "pile", "bar", "slap", "rod", "row", "bead", "drop")
 STARTS_M = (0.001, -0.001)  # offsets of further starts: single bounces are chaotic,
-MORE_STARTS = {"tube": 2, "rod": 2, "pile": 6, "row": 6}  # some more than others: this many to each side, 0.5 mm apart
+MORE_STARTS = {"tube": 2, "rod": 8, "pile": 6, "row": 6}  # some more than others: this many to each side, 0.5 mm apart
 
 
 def get_starts(name):
