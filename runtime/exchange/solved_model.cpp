@@ -116,6 +116,7 @@ bank::Bank make_bank(const SolvedModel& model, const std::string& name, const Re
   std::vector<std::int32_t> vertex_of(model.nodes.size(), -1);
   std::vector<std::size_t> used;
   bank.triangles = find_surface(model);
+  if (bank.triangles.empty()) throw InputError(fmt::format("{}: the tetrahedra have no outer face: some are there twice", name));
   for (Triangle& triangle : bank.triangles)
     for (std::int32_t& node : triangle) {
       std::int32_t& vertex = vertex_of[node];

@@ -37,7 +37,7 @@ inline void report(const char* what) { std::fprintf(stderr, "mutant: %s\n", what
 /// Renders with all outputs; the WAV must be complete. False: rejected.
 inline bool play(render::ProgramOptions options) {
   const Folder& folder = get_folder();
-  options.wav = folder / "out.wav";
+  options.sound = folder / "out.wav";
   options.report = folder / "out.json";
   options.quiet = true;
   try {

@@ -22,7 +22,8 @@ class PageWorld {
   /// restitution, friction, rolling_resistance, roughness_m, fixed, absent (0 or 1). Returns its number.
   int add_body(int bank, std::span<const double> numbers, const std::string& name);
   /// Starts the world. Numbers: gravity (3), ground (0: none), its height_m, young_modulus_pa, poisson_ratio, restitution, friction,
-  /// rolling_resistance, density_kg_m3, roughness_m; impacts with modes and masking of hits (0 or 1). Throws InputError as physics::World does.
+  /// rolling_resistance, density_kg_m3, roughness_m; impacts with modes and masking of hits (0 or 1). Throws InputError as physics::World
+  /// does.
   void start(std::span<const double> numbers);
   /// Advances to a time, and appends the events to `words` (event_words.hpp), in order of time. Returns the time reached [s].
   double advance(double until_s, std::vector<double>& words);
