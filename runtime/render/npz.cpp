@@ -40,7 +40,8 @@ void NpzWriter::add(const std::string& name, const std::string& type, const std:
   const std::string header = make_header(type, shape), file = name + ".npy";
   const std::uint64_t size = header.size() + bytes.size();
   if (written_ + size + directory_.size() >= 0xf0000000U) throw InputError("the labels are too large for .npz; write .jsonl instead");
-  const std::uint32_t crc = libdeflate_crc32(libdeflate_crc32(0, header.data(), header.size()), bytes.data(), bytes.size());
+  std::uint32_t crc = libdeflate_crc32(0, header.data(), header.size());
+  if (!bytes.empty()) crc = libdeflate_crc32(crc, bytes.data(), bytes.size());  // it restarts at a null pointer
   std::string fields;
   for (const auto& [value, count] : {std::pair<std::uint64_t, int>{kVersion, 2},
                                      {0, 2},
@@ -56,7 +57,7 @@ void NpzWriter::add(const std::string& name, const std::string& type, const std:
   directory_ += "PK\x01\x02";
   append(directory_, kVersion, 2);
   directory_ += fields;
-  append(directory_, 0, 10);  // comment, disk, attributes
+  directory_.append(10, '\0');  // comment, disk, attributes
   append(directory_, written_, 4);
   directory_ += file;
   ++files_;
