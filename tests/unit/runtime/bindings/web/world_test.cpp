@@ -17,10 +17,10 @@
 namespace carillon::web {
 namespace {
 
-const std::vector<double> kWorld{0, 0, -9.81, 1, 0, 30e9, 0.2, 0.5, 0.5, 2400, 20e-6, 1, 1};
+const std::vector<double> kWorld{0, 0, -9.81, 1, 0, 30e9, 0.2, 0.5, 0.5, 1e-3, 2400, 20e-6, 1, 1};
 
 std::vector<double> make_body(double height_m, bool is_fixed, bool is_absent) {
-  return {0, 0, height_m, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.3, 0.4, 2e-6, is_fixed ? 1.0 : 0.0, is_absent ? 1.0 : 0.0};
+  return {0, 0, height_m, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.3, 0.4, 1e-3, 2e-6, is_fixed ? 1.0 : 0.0, is_absent ? 1.0 : 0.0};
 }
 
 class PageWorldTest : public ::testing::Test {
@@ -57,7 +57,7 @@ TEST_F(PageWorldTest, RefusesWhatItCannotUse) {
   std::vector<double> words;
   EXPECT_THROW(world_.advance(1.0, words), InputError) << "has not started";
   EXPECT_THROW(world_.add_body(2, make_body(3.0, false, false), "cube"), InputError) << "no such bank";
-  EXPECT_THROW(world_.add_body(1, std::vector<double>(17, 1.0), "cube"), InputError) << "too few numbers";
+  EXPECT_THROW(world_.add_body(1, std::vector<double>(18, 1.0), "cube"), InputError) << "too few numbers";
   EXPECT_THROW(world_.start(std::vector<double>(3, 0.0)), InputError) << "too few numbers";
   world_.start(kWorld);
   EXPECT_THROW(world_.add_body(1, make_body(3.0, false, false), "cube"), InputError) << "too late";
