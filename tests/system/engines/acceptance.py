@@ -34,10 +34,9 @@ WAYS = ("box", "tube", "two")  # with impulses found from velocities, and with e
 WANTED_WAYS = {"found_db": 1.5, "early_db": 1.5}
 # What an engine does not meet, and its bound instead; the reasons are in docs/howto/my-engine.md.
 LIMITS = {
-    "simbody": {("rod", hz): {"windows_db": 4.5} for hz in STEPS},
-    "bullet": {("slide", 60): {"windows_db": 3.75}, ("rod", 60): {"windows_db": 3.25}, ("rod", 1000): {"windows_db": 4.75}},
-    "mujoco": {("pile", 60): {"windows_db": 3.25}, ("rod", 60): {"windows_db": 3.25}, ("rod", 240): {"windows_db": 4.0}},
-    "own": {("pile", 60): {"windows_db": 4.0}, ("pile", 1000): {"end_db": 4.0}},
+    "bullet": {("slide", 60): {"windows_db": 3.75}, ("rod", 1000): {"windows_db": 4.5}},
+    "mujoco": {("pile", 60): {"windows_db": 3.25}, ("rod", 60): {"windows_db": 3.5}},
+    "own": {("pile", 60): {"windows_db": 4.0}},
 }
 LEFT_OUT = {
     "simbody": ("pile", "bead"),  # its contact of boxes needs meshes, which cost 10 CPU s per s

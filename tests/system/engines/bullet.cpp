@@ -46,14 +46,14 @@ class Bullet : public Engine {
     if (step_s < 1e-3) world_.getSolverInfo().m_splitImpulsePenetrationThreshold = 1;
     // Overlap below the fall of a step is not corrected, so that piles come to rest; above 0.1 mm hits would be slowed down.
     world_.getSolverInfo().m_linearSlop = btScalar(std::min(1e-4, 9.81 * step_s * step_s));
-    add(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, &plane_));
+    add(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, &plane_), kRestitution);
     for (const Solid& solid : solids) {
       for (auto& shape : make_shapes(solid)) shapes_.push_back(std::move(shape));
       btRigidBody::btRigidBodyConstructionInfo info(btScalar(solid.mass_kg), nullptr, shapes_.back().get(), to_bullet(solid.inertia_kg_m2));
       const auto& q = solid.rotation;
       info.m_startWorldTransform =
           btTransform(btQuaternion(btScalar(q[1]), btScalar(q[2]), btScalar(q[3]), btScalar(q[0])), to_bullet(solid.position_m));
-      btRigidBody& body = add(info);
+      btRigidBody& body = add(info, solid.restitution);
       body.setLinearVelocity(to_bullet(solid.velocity_m_s));
       body.setAngularVelocity(to_bullet(solid.spin_rad_s));
       reader_.add(body, static_cast<std::int32_t>(bodies_.size()) - 2);
@@ -70,8 +70,8 @@ class Bullet : public Engine {
   }
 
  private:
-  btRigidBody& add(btRigidBody::btRigidBodyConstructionInfo info) {
-    info.m_restitution = btScalar(std::sqrt(kRestitution));  // Bullet takes products
+  btRigidBody& add(btRigidBody::btRigidBodyConstructionInfo info, double restitution) {
+    info.m_restitution = btScalar(restitution / std::sqrt(kRestitution));  // Bullet takes products
     info.m_friction = btScalar(std::sqrt(kFriction));
     bodies_.push_back(std::make_unique<btRigidBody>(info));
     bodies_.back()->setContactProcessingThreshold(0);

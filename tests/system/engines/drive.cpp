@@ -119,6 +119,7 @@ std::vector<Solid> read_solids(std::istream& in) {
     for (double* list : {s.half_m, s.position_m}) in >> list[0] >> list[1] >> list[2];
     for (double& x : s.rotation) in >> x;
     for (double* list : {s.velocity_m_s, s.spin_rad_s}) in >> list[0] >> list[1] >> list[2];
+    in >> s.restitution;
     if (!in) throw std::runtime_error("a body is incomplete");
   }
   return solids;

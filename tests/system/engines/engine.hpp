@@ -10,6 +10,8 @@
 
 namespace carillon::testing {
 
+constexpr double kRestitution = 0.5;  // of the ground, and of bodies that are not given another
+
 /// A body of a scene at its start. SI units, world axes; rotation w x y z of the mesh axes, which are principal axes.
 struct Solid {
   std::string name, kind, bank;  // kind: box, ball, or tube with its axis along x
@@ -17,9 +19,10 @@ struct Solid {
   double position_m[3] = {}, rotation[4] = {}, velocity_m_s[3] = {}, spin_rad_s[3] = {};
   double mass_kg = 0.0, inertia_kg_m2[3] = {};
   double modulus_pa = 1e11;  // E / (1 - nu^2)
+  double restitution = kRestitution;
 };
 
-constexpr double kRestitution = 0.5, kFriction = 0.447;  // of every contact: geometric mean of bodies (0.4) and ground (0.5)
+constexpr double kFriction = 0.447;  // of every contact: geometric mean of bodies (0.4) and ground (0.5)
 
 class Engine {
  public:

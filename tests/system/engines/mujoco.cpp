@@ -9,7 +9,7 @@
 namespace carillon::testing {
 namespace {
 
-constexpr double kSpring = 0.008, kDamping = 0.215;  // solref [s, 1]: restitution 0.5
+constexpr double kSpring = 0.008;  // s; first number of solref
 // s; in a step friction parts surfaces at 2 mu v step / kSpring, and beyond half of kSpring bodies gain energy.
 constexpr double kLongestStep = 2.5e-4;
 
@@ -20,18 +20,24 @@ std::string format(const char* text, Numbers... numbers) {
   return line;
 }
 
+/// Damping ratio of a contact, the second number of solref.
+double calc_damping(double restitution) {
+  const double decrement = -std::log(restitution);
+  return decrement / std::hypot(M_PI, decrement);
+}
+
 std::string describe(const Solid& s) {
   const double *p = s.position_m, *q = s.rotation, *i = s.inertia_kg_m2, *h = s.half_m;
   std::string text = format("<body name='%s' pos='%.9g %.9g %.9g' quat='%.9g %.9g %.9g %.9g'><freejoint/>", s.name.c_str(), p[0], p[1],
                             p[2], q[0], q[1], q[2], q[3]);
   text += format("<inertial pos='0 0 0' mass='%.9g' diaginertia='%.9g %.9g %.9g'/>", s.mass_kg, i[0], i[1], i[2]);
   if (s.kind == "box")
-    text += format("<geom type='box' size='%.9g %.9g %.9g'/>", h[0], h[1], h[2]);
+    text += format("<geom type='box' size='%.9g %.9g %.9g'", h[0], h[1], h[2]);
   else if (s.kind == "ball")
-    text += format("<geom type='sphere' size='%.9g'/>", h[0]);
+    text += format("<geom type='sphere' size='%.9g'", h[0]);
   else
-    text += format("<geom type='cylinder' size='%.9g %.9g' euler='0 90 0'/>", h[1], h[0]);
-  return text + "</body>";
+    text += format("<geom type='cylinder' size='%.9g %.9g' euler='0 90 0'", h[1], h[0]);
+  return text + format(" priority='1' solref='%.9g %.3f'/></body>", kSpring, calc_damping(s.restitution));  // not mixed with the ground's
 }
 
 class Mujoco : public Engine {
@@ -42,7 +48,7 @@ class Mujoco : public Engine {
         "<mujoco><compiler angle='degree'/><option timestep='%.9g' cone='elliptic' impratio='10'/><default><geom "
         "friction='%.3f 0.0001 0.00001' solref='%.9g %.3f' solimp='0.95 0.99 0.0005' condim='4'/></default>"
         "<worldbody><geom type='plane' size='5 5 0.1'/>",
-        step_s / substeps_, kFriction, kSpring, kDamping);
+        step_s / substeps_, kFriction, kSpring, calc_damping(kRestitution));
     for (const Solid& solid : solids) text += describe(solid);
     text += "</worldbody></mujoco>";
     std::FILE* file = std::fopen("mujoco.xml", "w");
