@@ -48,7 +48,7 @@ RecutAnswer Recut::begin(const std::string& request) {
   const fs::path bank = find_bank((*asked)["bank"].as_string());
   if (bank.empty()) return refuse(400, "this folder has no such bank");
   const auto program = base::find_program("carillon-tune");
-  if (!program) return refuse(501, "carillon-tune is not installed");
+  if (!program) return refuse(503, "carillon-tune is not installed");
   std::error_code error;
   int number = 1;
   const auto name = [&](const char* ending) { return folder_ / fmt::format("recut-{}{}", number, ending); };

@@ -94,8 +94,6 @@ const char* find_reason(int status) {
       return "Request Header Fields Too Large";
     case 500:
       return "Internal Server Error";
-    case 501:
-      return "Not Implemented";
     case 505:
       return "HTTP Version Not Supported";
     default:

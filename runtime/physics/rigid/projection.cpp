@@ -19,7 +19,6 @@ constexpr double kToleranceM = 1e-7;     // m; tolerance of sweeps,
 constexpr int kMaxSweeps = 200;          // maximum number of sweeps
 constexpr double kMaxRatio = 10.0;       // displacement of any point relative to the excess of the deepest touch
 constexpr double kMaxPaidRatio = 0.5;    // fraction of the kinetic energy
-constexpr double kFarM = 2e-5;           // m; displacements that may need touches that were not there
 constexpr double kDisplacedRatio = 0.1;  // relative to the largest displacement: bodies that pay
 
 }  // namespace
@@ -145,7 +144,7 @@ void Projection::move(const Step& step, const std::vector<Mover>& displacements,
       touches_.refresh(*pair);
       touches_.remove_false(*pair);
     }
-    if (moved_m > kFarM && can_part(step, *pair)) touches_.complete_in_flight(*pair, 0.0);
+    if (moved_m > kMaxDepthM && can_part(step, *pair)) touches_.complete_in_flight(*pair, 0.0);
   }
   if (const double owed_j = bodies_.calc_energy(step.island().bodies) - before_j; is_held && owed_j > 0.0) pay(step, displacements, owed_j);
   double gained_j = bodies_.calc_energy(step.island().bodies) - before_j;

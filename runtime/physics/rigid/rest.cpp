@@ -23,10 +23,10 @@ constexpr double kNeighbourSlowS = 0.05;   // s; and of the bodies that it touch
 constexpr double kMaxTouchSpeedMS = 5e-4;  // m/s; with no faster contact
 constexpr double kStillM = 5e-5;           // m; a body stays in place while no point moves farther
 constexpr double kWakeForceRatio = 0.05;   // fraction of the weight: change of the forces that wakes a body
-constexpr double kSwingRatio = 0.35;       // of the radius of a body: what moves no farther swings in place;
-constexpr double kSwingDelayS = 0.5;       // s; after this time the rolling resistance of a body on others grows;
-constexpr double kSettlingPerS = 20.0;     // the growth, as a multiple per s,
-constexpr double kMaxSettling = 30.0;      // up to this one
+constexpr double kSwingRatio = 0.35;       // movement of a swing in place, relative to the radius of the body
+constexpr double kSwingDelayS = 0.5;       // s; swing in place before the rolling resistance grows
+constexpr double kSettlingPerS = 20.0;     // 1/s; growth of the resistance, relative to its value
+constexpr double kMaxSettling = 30.0;      // largest resistance, likewise
 
 /// Upper bound of the distance of any point of a body between two poses [m].
 double calc_distance(const Solid& solid, const State& a, const State& b) {

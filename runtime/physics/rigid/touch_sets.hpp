@@ -48,12 +48,12 @@ class TouchSets {
   void forget_closing(const Step& step) const;
   /// Touches at the end of a step.
   struct Ahead {
-    bool was_missing = false;  // any touch, or with `finds_closing` one that closes
-    double depth_m = 0.0;      // of the deepest point of any pair, beyond what springs and modes explain
+    bool was_missing = false;  // touches, or with `finds_closing` closings
+    double depth_m = 0.0;      // largest penetration, less the explained depth of its pair
   };
   /// Adds touches that are missing at the end of a step by its predicted motion, and with `finds_closing` finds those that close.
   Ahead complete(const Step& step, bool finds_closing);
-  /// Like complete(), for a pair in a modal impact, by free flight.
+  /// Like complete(), for one pair after a time of free flight.
   void complete_in_flight(Pair& pair, double time_s);
   /// Closing point of a touch of a curved surface within a time of free flight, moved back with the bodies.
   geometry::Touch find_closing(Pair& pair, const Contact& contact, double time_s) const;

@@ -207,7 +207,8 @@ def main():
         }
         (folder / "own.json").write_text(json.dumps(job))
         run(folder, BIN / "carillon-precompute", "-q", "own.json")
-        run(folder, BIN / "carillon-bank", "import", "m.frd", "--material", "ccx steel", "-o", "m.hdf")
+        said = run(folder, BIN / "carillon-bank", "import", "m.frd", "--material", "ccx steel", "-o", "m.hdf")
+        assert "6 rigid modes were left out" in said and f"{MODES} modes" in said, said  # of MODES + 6
         run(folder, BIN / "carillon-bank", "import", "mm.frd", "--material", "ccx steel", "--unit", "mm-t-s", "-o", "mm.hdf")
         said = run(folder, BIN / "carillon-bank", "info", "m.hdf")
         assert "imported from CalculiX 2.20, accuracy unknown" in said, said

@@ -37,6 +37,7 @@ const Case kCases[] = {
     {"no bank", [](auto& w, auto&) { w.bodies[0].bank = nullptr; }, {"'cup'", "no bank"}},
     {"restitution", [](auto& w, auto&) { w.bodies[0].restitution = 1.5; }, {"'cup'", "restitution", "1.5", "0..1"}},
     {"friction", [](auto& w, auto&) { w.bodies[0].friction = -1; }, {"'cup'", "friction", "-1"}},
+    {"rolling", [](auto& w, auto&) { w.bodies[0].rolling_resistance = -1; }, {"'cup'", "rolling_resistance", "-1"}},
     {"velocity", [](auto& w, auto&) { w.bodies[0].velocity_m_s[1] = kNan; }, {"'cup'", "velocity", "finite"}},
     {"rotation", [](auto& w, auto&) { w.bodies[0].initial.rotation.fill(0); }, {"'cup'", "rotation", "1 0 0 0"}},
     {"fixed and moving",

@@ -195,22 +195,27 @@ class Falling : public testing::TestWithParam<std::array<double, 2>> {};
 INSTANTIATE_TEST_SUITE_P(Plates, Falling,
                          testing::Values(std::array{0.3, 0.002}, std::array{0.2, 0.0005}, std::array{0.024, 0.002}));  // plate, sheet, coin
 
+/// A plate that falls on a corner; `turn` chooses which way it is tilted.
+WorldSpec make_fall(const bank::Bank& plate, double height_m, double restitution, int turn) {
+  WorldSpec spec;
+  spec.ground = GroundSpec{.restitution = restitution};
+  BodySpec body;
+  body.name = "plate";
+  body.bank = &plate;
+  body.restitution = restitution;
+  body.initial.position_m = {0, 0, height_m};
+  body.initial.rotation = {1.0, 0.1 + 0.2 * turn, 0.15 * turn, 0.0};
+  spec.bodies = {body};
+  return spec;
+}
+
 TEST_P(Falling, ModalEnergyBelowLossOfMotion) {
   const auto [side, thickness] = GetParam();
   const bank::Bank plate = make_plate_bank(side, thickness, side > 0.1 ? 6e3 : 60e3, 16, 3.0);
   const std::size_t modes = plate.mode_count();
   ASSERT_GT(modes, 5U);
   for (int turn = 0; turn < 3; ++turn) {
-    WorldSpec spec;
-    spec.ground = GroundSpec{.restitution = 1.0};
-    BodySpec body;
-    body.name = "plate";
-    body.bank = &plate;
-    body.restitution = 1.0;
-    body.initial.position_m = {0, 0, 0.6};
-    body.initial.rotation = {1.0, 0.1 + 0.2 * turn, 0.15 * turn, 0.0};
-    spec.bodies = {body};
-    World world(spec, {.end_s = 1.0, .audits_energy = true});
+    World world(make_fall(plate, 0.6, 1.0, turn), {.end_s = 1.0, .audits_energy = true});
     const double end_s = 0.5;
     std::vector<events::Force> forces;
     events::BodyMotion last;
@@ -259,16 +264,7 @@ TEST(SoftPlate, PulsesOfABlowHaveItsImpulseAndLessThanItsLoss) {
   for (double& lambda : plate.eigenvalue_rad2_s2) lambda *= softer;
   const double mass_kg = plate.rigid.mass_kg;
   for (int turn = 0; turn < 3; ++turn) {
-    WorldSpec spec;
-    spec.ground = GroundSpec{.restitution = 0.6};
-    BodySpec body;
-    body.name = "plate";
-    body.bank = &plate;
-    body.restitution = 0.6;
-    body.initial.position_m = {0, 0, 0.3};
-    body.initial.rotation = {1.0, 0.1 + 0.2 * turn, 0.15 * turn, 0.0};
-    spec.bodies = {body};
-    World world(spec, {.end_s = 0.3, .audits_energy = true});
+    World world(make_fall(plate, 0.3, 0.6, turn), {.end_s = 0.3, .audits_energy = true});
     std::vector<Impulse> pulses;
     std::vector<events::BodyMotion> motions;
     world.advance(0.3, std::numeric_limits<double>::infinity(), [&](const events::Event& e) {
