@@ -92,7 +92,7 @@ def main():
         root = pathlib.Path(folder)
         run(BIN / "write_cube_bank", root / "cube.h5")
         half, turned = f" {SIDE / 2}" * 3, [math.cos(ANGLE / 2), *(math.sin(ANGLE / 2) * AXIS)]
-        cube = f"body box {root / 'cube.h5'} {half} 0 0 {HEIGHT} {' '.join(map(str, turned))} 0 0 0 0 0 0"
+        cube = f"body box {root / 'cube.h5'} {half} 0 0 {HEIGHT} {' '.join(map(str, turned))} 0 0 0 0 0 0 {RESTITUTION}"
         run(BIN / "engine_bullet", 2000, 1.5, root / "bullet.jsonl", root / "live.f32", words=cube)
         run(BIN / "engine_bullet", 2000, 1.5, root / "rigid.jsonl", root / "rigid.f32", 0, words=cube)  # no impacts with modes
         assert " 0 events lost" in run(BIN / "bullet_drop", root / "cube.h5", root / "example.f32")
