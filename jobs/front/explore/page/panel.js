@@ -150,7 +150,7 @@ export class Panel {
     this.sayAgain(`computing ${body.name} …`);
     try {
       const answer = await fetch('recut', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: request }).catch(() => null);
-      if (!answer || [403, 404, 405, 503].includes(answer.status)) return this.offerCuts(body, request);
+      if (!answer || [403, 404, 405, 501, 503].includes(answer.status)) return this.offerCuts(body, request);
       const said = await answer.json();
       if (said.error) throw new Error(said.error);
       const done = await waitForResult(said.result);
