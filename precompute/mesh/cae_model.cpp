@@ -174,6 +174,21 @@ void CaeModel::add_existing(bool is_elements, const Range& range, Set& set) {
     if (is_in(*at)) set.members.push_back({*at, 0});
 }
 
+/// The nodes of an element set, each once.
+void CaeModel::add_nodes_of(const Set& elements, std::size_t place, Set& set) {
+  std::vector<std::int64_t> tags;
+  const std::size_t count = raw_.order == 2 ? 10 : 4;
+  const auto add = [&](const std::vector<std::int64_t>& from, std::size_t begin, std::size_t end) {
+    spend(place, end - begin);
+    tags.insert(tags.end(), from.begin() + static_cast<std::ptrdiff_t>(begin), from.begin() + static_cast<std::ptrdiff_t>(end));
+  };
+  for (const std::int64_t tet : elements.tets) add(raw_.tets, tet * count, (tet + 1) * count);
+  for (const std::int64_t other : elements.others) add(other_nodes_, other == 0 ? 0 : other_ends_[other - 1], other_ends_[other]);
+  std::sort(tags.begin(), tags.end());
+  tags.erase(std::unique(tags.begin(), tags.end()), tags.end());
+  for (const std::int64_t tag : tags) set.members.push_back({tag, place});
+}
+
 CaeModel::Set& CaeModel::resolve(bool is_elements, const std::string& name, std::size_t place) {
   Sets& sets = is_elements ? element_sets_ : node_sets_;
   const auto found = sets.find(find_name(name));
@@ -194,6 +209,7 @@ CaeModel::Set& CaeModel::resolve(bool is_elements, const std::string& name, std:
     set.tets.insert(set.tets.end(), other.tets.begin(), other.tets.end());
     set.others.insert(set.others.end(), other.others.begin(), other.others.end());
   }
+  for (const auto& [elements, at] : set.of_elements) add_nodes_of(resolve(true, elements, at), at, set);
   for (const Range& range : set.ranges) {
     const std::size_t before = set.members.size() + set.tets.size() + set.others.size();
     add_existing(is_elements, range, set);

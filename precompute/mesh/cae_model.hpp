@@ -29,13 +29,14 @@ class CaeModel {
   struct Range {
     std::int64_t first, last, step;
   };
-  /// The reader fills the first three.
+  /// The reader fills the first four.
   struct Set {
-    std::vector<RawMesh::Reference> members;                 // nodes or elements
-    std::vector<Range> ranges;                               // what exists of them
-    std::vector<std::pair<std::string, std::size_t>> parts;  // sets of the same kind, with their places
-    std::vector<std::int64_t> tets, others;                  // positions, of element sets
-    std::size_t order = 0;                                   // of its definition
+    std::vector<RawMesh::Reference> members;                       // nodes or elements
+    std::vector<Range> ranges;                                     // what exists of them
+    std::vector<std::pair<std::string, std::size_t>> parts;        // sets of the same kind, with their places
+    std::vector<std::pair<std::string, std::size_t>> of_elements;  // of node sets: element sets whose nodes belong to it
+    std::vector<std::int64_t> tets, others;                        // positions, of element sets
+    std::size_t order = 0;                                         // of its definition
     bool is_resolved = false, is_open = false;
   };
 
@@ -94,6 +95,7 @@ class CaeModel {
   Set& resolve(bool is_elements, const std::string& name, std::size_t place);
   void add_element(const RawMesh::Reference& element, const std::string& name, Set& set);
   void add_existing(bool is_elements, const Range& range, Set& set);
+  void add_nodes_of(const Set& elements, std::size_t place, Set& set);
   void resolve_sets();
   void find_regions(TetMesh& mesh);
   void choose_small_sets();

@@ -176,8 +176,11 @@ void InpReader::read_set(const Keyword& keyword, bool is_elements) {
   CaeModel::Set& set = model_.open_set(is_elements, name);
   std::string_view line;
   std::size_t place = 0;
-  if (!is_elements && keyword.has("ELSET"))
-    cursor_.fail(keyword.place, "*NSET with ELSET={} is not read; list its nodes, or use the element set itself", keyword.get("ELSET"));
+  if (!is_elements && keyword.has("ELSET")) {
+    if (next_data(line, place)) cursor_.fail(place, "*NSET with ELSET takes the nodes of that set and has no data; remove this line");
+    set.of_elements.emplace_back(keyword.get("ELSET"), keyword.place);
+    return;
+  }
   while (next_data(line, place)) {
     split(line, fields_);
     if (is_generated) {

@@ -52,6 +52,19 @@ TEST(inp, smallest_set_is_the_region_without_sections) {
   EXPECT_EQ(mesh.unit_m, 1.0);
 }
 
+TEST(inp, node_sets_of_element_sets) {
+  const std::string sets = "*ELSET, ELSET=Half, INTERNAL, INSTANCE=Part-1-1\n11\n*ELSET, ELSET=Edge, GENERATE, INTERNAL\n20, 20\n";
+  const TetMesh mesh =
+      parse_inp_text(kNodes + kTets + "*ELEMENT, TYPE=T3D2\n20, 1, 5\n" + "*NSET, NSET=Late, ELSET=half, INTERNAL\n" + sets +
+                     "*NSET, ELSET=Edge, NSET=Bar\n*NSET, NSET=Spelled, UNSORTED\n5, 2, 4,\n3\n*NSET, NSET=Joined\nBar, 2\n" +
+                     "*NSET, NSET=Bar, UNSORTED, INTERNAL, GENERATE\n3, 3, 1\n*NSET, NSET=Whole, ELSET=ALL\n");
+  EXPECT_EQ(mesh.node_sets.at("Spelled"), (std::vector<std::int32_t>{1, 2, 3, 4}));
+  EXPECT_EQ(mesh.node_sets.at("Late"), mesh.node_sets.at("Spelled"));
+  EXPECT_EQ(mesh.node_sets.at("Bar"), (std::vector<std::int32_t>{0, 2, 4}));
+  EXPECT_EQ(mesh.node_sets.at("Joined"), (std::vector<std::int32_t>{0, 1, 2, 4}));
+  EXPECT_EQ(mesh.node_sets.at("Whole"), (std::vector<std::int32_t>{0, 1, 2, 3, 4}));
+}
+
 TEST(inp, units_of_inch_and_metre) {
   const auto with = [&](const std::string& young, const std::string& density) {
     return parse_inp_text(kNodes + kTets + "*MATERIAL, NAME=M\n*DENSITY\n" + density + "\n*ELASTIC\n" + young +
@@ -108,6 +121,8 @@ TEST(inp, refused) {
            {"unknown_set", kNodes + kTets + "*BOUNDARY\nRout, 1, 3\n", "a.inp:12: there is no node set 'Rout'"},
            {"unknown_element", kNodes + kTets + "*ELSET, ELSET=A\n77\n", "a.inp:12: the set 'A' names element 77"},
            {"circle", kNodes + kTets + "*NSET, NSET=A\nB\n*NSET, NSET=B\nA\n", "is part of itself"},
+           {"no_such_elements", kNodes + kTets + "*NSET, NSET=A, ELSET=Rest\n", "a.inp:11: there is no element set 'Rest'"},
+           {"nodes_beside_elements", kNodes + kTets + "*NSET, NSET=A, ELSET=All\n1, 2\n", "a.inp:12: *NSET with ELSET takes the nodes"},
            {"backwards", kNodes + kTets + "*NSET, NSET=A, GENERATE\n5, 1, 1\n", "a.inp:12: GENERATE from 5 to 1"},
            {"transform", kNodes + kTets + "*TRANSFORM, NSET=A\n1,0,0,0,1,0\n", "a.inp:11: *TRANSFORM is not read"},
            {"orientation", kNodes + kTets + "*ORIENTATION, NAME=A\n1,0,0,0,1,0\n", "a.inp:11: *ORIENTATION is not read"},
