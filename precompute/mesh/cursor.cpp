@@ -19,15 +19,7 @@ std::string quote_excerpt(std::string_view text) {
   return shown + (text.size() > kLongest ? "...'" : "'");
 }
 
-std::string Cursor::find_place(std::size_t place) const {
-  place = std::min(place, bytes_.size());
-  const auto after = std::upper_bound(origins_.begin(), origins_.end(), place,
-                                      [](std::size_t at, const base::TextOrigin& origin) { return at < origin.begin; });
-  const base::TextOrigin whole{0, name_, 1};
-  const base::TextOrigin& origin = after == origins_.begin() ? whole : *(after - 1);
-  const auto at = [&](std::size_t position) { return bytes_.begin() + static_cast<std::ptrdiff_t>(position); };
-  return fmt::format("{}:{}", origin.file, origin.first_line + static_cast<std::size_t>(std::count(at(origin.begin), at(place), '\n')));
-}
+std::string Cursor::find_place(std::size_t place) const { return base::find_place(bytes_, name_, origins_, place); }
 
 void Cursor::fail_text(std::size_t place, const std::string& message) const {
   if (binary_) throw InputError(fmt::format("{}: byte {}: {}", name_, place, message));

@@ -1,23 +1,19 @@
-// Fields of the lines of CAE files: separated by commas or of fixed width. Internal header of the readers.
+// Fields of the lines of CAE files, with messages. Internal header of the readers.
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "precompute/mesh/cursor.hpp"
+#include "runtime/base/fields.hpp"
 
 namespace carillon::mesh {
 
-/// Without blanks at both ends.
-std::string_view trim(std::string_view text);
-std::string to_upper(std::string_view text);
+using base::split;
+using base::to_upper;
+using base::trim;
 
-/// Fields of a line between commas, trimmed; an empty one after a comma at the end is left out.
-void split(std::string_view line, std::vector<std::string_view>& fields);
-
-/// Number of a field: also "1.5D+3" and, as Nastran writes it, "7.85-9". InputError at `place` in the file.
+/// Number of a field. InputError at `place` in the file.
 double parse_real(const Cursor& cursor, std::size_t place, std::string_view field, const char* what);
 std::int64_t parse_int(const Cursor& cursor, std::size_t place, std::string_view field, const char* what);
 

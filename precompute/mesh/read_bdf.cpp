@@ -1,24 +1,22 @@
-// Method: bulk data cards in fields of 8 or 16 columns or between commas, with their continuations; of the case control only SPC.
+// Method: bulk data cards; of the case control only SPC.
 // Source: MSC Nastran quick reference guide: GRID, CTETRA, PSOLID, MAT1, SPC, SPC1, SPCADD, PARAM WTMASS.
 // Limitation: nodes in the basic coordinate system only; constraints between nodes (RBE2, MPC ...) are named and left out.
 
 #include <algorithm>
-#include <deque>
 #include <set>
 
 #include "precompute/mesh/cae_model.hpp"
 #include "precompute/mesh/fields.hpp"
+#include "runtime/base/bdf_cards.hpp"
 
 namespace carillon::mesh {
 
 namespace {
 
-constexpr std::size_t kNameWidth = 8, kDataEnd = 72;
-
 class BdfReader {
  public:
   BdfReader(std::string_view bytes, const std::string& name, std::span<const base::TextOrigin> origins)
-      : cursor_(bytes, name), model_(cursor_) {
+      : cursor_(bytes, name), cards_(bytes), model_(cursor_) {
     cursor_.set_origins(origins);
   }
   TetMesh read();
@@ -30,14 +28,11 @@ class BdfReader {
     std::size_t place;
   };
 
-  bool next_line();
-  bool find_bulk();
-  void add_fields();
-  bool read_card();
-  std::string_view get(std::size_t i) const { return i < fields_.size() ? fields_[i] : std::string_view(); }
-  std::int64_t get_int(std::size_t i, const char* what) { return parse_int(cursor_, place_, get(i), what); }
+  void read_control(std::string_view upper, std::size_t place);
+  std::string_view get(std::size_t i) const { return cards_.get(i); }
+  std::int64_t get_int(std::size_t i, const char* what) { return parse_int(cursor_, cards_.place(), get(i), what); }
   std::optional<double> find_real(std::size_t i, const char* what) {
-    return get(i).empty() ? std::nullopt : std::optional(parse_real(cursor_, place_, get(i), what));
+    return get(i).empty() ? std::nullopt : std::optional(parse_real(cursor_, cards_.place(), get(i), what));
   }
   unsigned find_directions(std::string_view field);
   void read_grid();
@@ -49,12 +44,8 @@ class BdfReader {
   void hold();
 
   Cursor cursor_;
+  base::BdfCards cards_;
   CaeModel model_;
-  std::string_view line_;
-  std::size_t place_ = 0;  // of the card
-  std::string name_;       // of the card, in upper case
-  std::vector<std::string_view> fields_, split_;
-  std::deque<std::string> kept_;  // untabbed lines of the card
   std::vector<std::int64_t> nodes_;
   std::map<std::int64_t, std::vector<Held>> held_;          // by number of the set
   std::map<std::int64_t, std::vector<std::int64_t>> sums_;  // SPCADD
@@ -64,82 +55,18 @@ class BdfReader {
   double mass_factor_ = 1.0;
 };
 
-/// The next line that is neither empty nor a comment, without a comment at its end.
-bool BdfReader::next_line() {
-  while (cursor_.remaining() > 0) {
-    line_ = cursor_.line();
-    line_ = line_.substr(0, line_.find('$'));
-    if (!trim(line_).empty()) return true;
-  }
-  return false;
-}
-
-/// Leaves the cursor at the bulk data.
-bool BdfReader::find_bulk() {
-  while (next_line()) {
-    const std::string upper = to_upper(trim(line_));
-    if (upper.starts_with("BEGIN")) return true;
-    if (upper.starts_with("GRID") || upper.starts_with("CTETRA")) break;
-    if (upper.starts_with("SPC") && upper.find('=') != std::string::npos && upper.find(',') == std::string::npos) {
-      const std::string_view value = trim(std::string_view(upper).substr(upper.find('=') + 1));
-      if (is_int(value)) chosen_ = parse_int(cursor_, cursor_.place(), value, "the number of an SPC set");
-    }
-  }
-  cursor_.seek(0);
-  return false;
-}
-
-/// Fields of a line of a card, filled up to the width of the line.
-void BdfReader::add_fields() {
-  std::string_view line = line_;
-  if (line.find(',') != std::string_view::npos) {
-    split(line, split_);
-    const std::size_t count = 8;
-    for (std::size_t i = 1; i <= count; ++i) fields_.push_back(i < split_.size() ? split_[i] : std::string_view());
-    return;
-  }
-  if (line.find('\t') != std::string_view::npos) {
-    std::string& text = kept_.emplace_back();
-    for (const char c : line) {
-      text += c == '\t' ? ' ' : c;
-      while (c == '\t' && text.size() % kNameWidth != 0) text += ' ';
-    }
-    line = text;
-  }
-  const std::size_t width = line.substr(0, kNameWidth).find('*') != std::string_view::npos ? 16 : 8;
-  for (std::size_t at = kNameWidth; at < kDataEnd; at += width)
-    fields_.push_back(at < line.size() ? trim(line.substr(at, width)) : std::string_view());
-}
-
-/// One card with its continuations; false at the end of the data.
-bool BdfReader::read_card() {
-  place_ = cursor_.place();
-  if (!next_line()) return false;
-  kept_.clear();
-  fields_.clear();
-  std::string_view name = line_.substr(0, std::min(line_.find(','), kNameWidth));
-  name = trim(name.substr(0, name.find('*')));
-  name_ = to_upper(name.substr(0, name.find_first_of(" \t")));
-  place_ = static_cast<std::size_t>(line_.data() - cursor_.bytes().data());
-  add_fields();
-  for (;;) {
-    const std::size_t before = cursor_.place();
-    if (!next_line()) break;
-    const char first = line_[0];
-    const bool goes_on = first == '+' || first == '*' || first == ',' || first == '\t' || trim(line_.substr(0, kNameWidth)).empty();
-    if (!goes_on) {
-      cursor_.seek(before);
-      break;
-    }
-    add_fields();
-  }
-  return true;
+/// The chosen SPC set of the case control.
+void BdfReader::read_control(std::string_view upper, std::size_t place) {
+  if (!upper.starts_with("SPC") || upper.find('=') == std::string::npos || upper.find(',') != std::string::npos) return;
+  const std::string_view value = trim(upper.substr(upper.find('=') + 1));
+  if (is_int(value)) chosen_ = parse_int(cursor_, place, value, "the number of an SPC set");
 }
 
 unsigned BdfReader::find_directions(std::string_view field) {
   unsigned directions = 0;
   for (const char c : field) {
-    if (c < '0' || c > '6') cursor_.fail(place_, "expected directions such as 123, found {}; correct the card", quote_excerpt(field));
+    if (c < '0' || c > '6')
+      cursor_.fail(cards_.place(), "expected directions such as 123, found {}; correct the card", quote_excerpt(field));
     if (c >= '1' && c <= '3') directions |= 1U << (c - '1');
   }
   return directions;
@@ -148,25 +75,25 @@ unsigned BdfReader::find_directions(std::string_view field) {
 void BdfReader::read_grid() {
   const std::int64_t tag = get_int(0, "the number of a node");
   if (!get(1).empty() && get(1) != "0" && get_int(1, "a coordinate system") != 0)
-    cursor_.fail(place_, "node {} is in coordinate system {}; write the nodes in the basic system (CP 0)", tag, get(1));
+    cursor_.fail(cards_.place(), "node {} is in coordinate system {}; write the nodes in the basic system (CP 0)", tag, get(1));
   Vec3 x{};
   for (std::size_t k = 0; k < 3; ++k) x[k] = find_real(2 + k, "a coordinate").value_or(0.0);
-  model_.add_node(tag, x, place_);
-  if (const unsigned directions = find_directions(get(6)); directions != 0) model_.hold_node(tag, directions, place_);
+  model_.add_node(tag, x, cards_.place());
+  if (const unsigned directions = find_directions(get(6)); directions != 0) model_.hold_node(tag, directions, cards_.place());
 }
 
 void BdfReader::read_tet() {
   const std::int64_t tag = get_int(0, "the number of an element");
   const std::int64_t property = get(1).empty() ? tag : get_int(1, "a property");
   nodes_.clear();
-  for (std::size_t i = 2; i < fields_.size() && !get(i).empty(); ++i) nodes_.push_back(get_int(i, "the number of a node"));
+  for (std::size_t i = 2; i < cards_.count() && !get(i).empty(); ++i) nodes_.push_back(get_int(i, "the number of a node"));
   if (nodes_.size() != 4 && nodes_.size() != 10)
-    cursor_.fail(place_, "CTETRA {} has {} nodes; it needs 4 or 10: write the file again", tag, nodes_.size());
-  model_.add_tet(tag, nodes_, static_cast<std::int32_t>(std::clamp<std::int64_t>(property, 0, INT32_MAX)), place_);
+    cursor_.fail(cards_.place(), "CTETRA {} has {} nodes; it needs 4 or 10: write the file again", tag, nodes_.size());
+  model_.add_tet(tag, nodes_, static_cast<std::int32_t>(std::clamp<std::int64_t>(property, 0, INT32_MAX)), cards_.place());
 }
 
 void BdfReader::read_material() {
-  CaeMaterial& material = model_.add_material(fmt::format("MAT1 {}", get_int(0, "the number of a material")), place_);
+  CaeMaterial& material = model_.add_material(fmt::format("MAT1 {}", get_int(0, "the number of a material")), cards_.place());
   const auto young = find_real(1, "Young's modulus"), shear = find_real(2, "the shear modulus");
   material.young = young;
   material.poisson = find_real(3, "Poisson's ratio");
@@ -179,9 +106,9 @@ void BdfReader::read_material() {
 
 void BdfReader::read_spc() {
   std::vector<Held>& held = held_[get_int(0, "the number of a set")];
-  for (std::size_t i = 1; i + 1 < fields_.size() && i < 7 && !get(i).empty(); i += 3) {
+  for (std::size_t i = 1; i + 1 < cards_.count() && i < 7 && !get(i).empty(); i += 3) {
     const std::int64_t node = get_int(i, "the number of a node");
-    held.push_back({node, node, find_directions(get(i + 1)), place_});
+    held.push_back({node, node, find_directions(get(i + 1)), cards_.place()});
   }
 }
 
@@ -190,34 +117,36 @@ void BdfReader::read_spc1() {
   const unsigned directions = find_directions(get(1));
   if (to_upper(get(3)) == "THRU") {
     const std::int64_t first = get_int(2, "the first node"), last = get_int(4, "the last node");
-    if (last < first) cursor_.fail(place_, "SPC1 from {} THRU {} has no node; give the smaller number first", first, last);
-    held.push_back({first, last, directions, place_});
+    if (last < first) cursor_.fail(cards_.place(), "SPC1 from {} THRU {} has no node; give the smaller number first", first, last);
+    held.push_back({first, last, directions, cards_.place()});
     return;
   }
-  for (std::size_t i = 2; i < fields_.size(); ++i) {
+  for (std::size_t i = 2; i < cards_.count(); ++i) {
     if (get(i).empty()) continue;
     const std::int64_t node = get_int(i, "the number of a node");
-    held.push_back({node, node, directions, place_});
+    held.push_back({node, node, directions, cards_.place()});
   }
 }
 
 void BdfReader::read_other() {
   static const std::map<std::string, const char*, std::less<>> kSolids{
       {"CHEXA", "hexahedra"}, {"CPENTA", "wedges"}, {"CPYRAM", "pyramids"}};
-  if (const auto found = kSolids.find(name_); found != kSolids.end())
-    cursor_.fail(place_, "the mesh holds {} ({}); only tetrahedra (CTETRA) are read: mesh the volume with those", found->second, name_);
-  if (name_ == "GRDSET" && !get(1).empty() && get(1) != "0")
-    cursor_.fail(place_, "GRDSET names coordinate system {}; write the nodes in the basic system", get(1));
-  if (name_ == "INCLUDE") cursor_.fail(place_, "INCLUDE cannot be followed here; join the files");
+  if (const auto found = kSolids.find(cards_.name()); found != kSolids.end())
+    cursor_.fail(cards_.place(), "the mesh holds {} ({}); only tetrahedra (CTETRA) are read: mesh the volume with those", found->second,
+                 cards_.name());
+  if (cards_.name() == "GRDSET" && !get(1).empty() && get(1) != "0")
+    cursor_.fail(cards_.place(), "GRDSET names coordinate system {}; write the nodes in the basic system", get(1));
+  if (cards_.name() == "INCLUDE") cursor_.fail(cards_.place(), "INCLUDE cannot be followed here; join the files");
   static const std::set<std::string, std::less<>> kConstraints{"RBE1",   "RBE2",   "RBE3",  "RBAR", "MPC",   "CONM2", "CONM1",
                                                                "CELAS1", "CELAS2", "CBUSH", "CBAR", "CBEAM", "CROD",  "CMASS2"};
-  const bool is_shell = name_.starts_with("CQUAD") || name_.starts_with("CTRIA");
-  if ((is_shell || kConstraints.contains(name_)) && left_out_.insert(name_).second)
-    model_.remark(place_, fmt::format("{} is left out: only tetrahedra vibrate", name_));
+  const bool is_shell = cards_.name().starts_with("CQUAD") || cards_.name().starts_with("CTRIA");
+  if ((is_shell || kConstraints.contains(cards_.name())) && left_out_.insert(cards_.name()).second)
+    model_.remark(cards_.place(), fmt::format("{} is left out: only tetrahedra vibrate", cards_.name()));
   static const std::set<std::string, std::less<>> kSolidMaterials{"MAT3", "MAT9", "MAT11"};
-  if (kSolidMaterials.contains(name_)) {
-    CaeMaterial& material = model_.add_material(fmt::format("MAT1 {}", get_int(0, "the number of a material")), place_);
-    material.problem = fmt::format("{}: {} is not read, only MAT1; give \"orthotropic\" in the job", cursor_.find_place(place_), name_);
+  if (kSolidMaterials.contains(cards_.name())) {
+    CaeMaterial& material = model_.add_material(fmt::format("MAT1 {}", get_int(0, "the number of a material")), cards_.place());
+    material.problem =
+        fmt::format("{}: {} is not read, only MAT1; give \"orthotropic\" in the job", cursor_.find_place(cards_.place()), cards_.name());
   }
 }
 
@@ -252,29 +181,29 @@ void BdfReader::hold() {
 }
 
 TetMesh BdfReader::read() {
-  find_bulk();
+  cards_.find_bulk([this](std::string_view line, std::size_t place) { read_control(line, place); });
   bool has_end = false;
-  while (!has_end && read_card()) {
-    if (name_ == "GRID") {
+  while (!has_end && cards_.next()) {
+    if (cards_.name() == "GRID") {
       read_grid();
-    } else if (name_ == "CTETRA") {
+    } else if (cards_.name() == "CTETRA") {
       read_tet();
-    } else if (name_ == "PSOLID") {
+    } else if (cards_.name() == "PSOLID") {
       const std::int64_t property = get_int(0, "the number of a property");
       model_.set_section(static_cast<std::int32_t>(std::clamp<std::int64_t>(property, 0, INT32_MAX)),
-                         fmt::format("MAT1 {}", get_int(1, "the number of a material")), place_);
-    } else if (name_ == "MAT1") {
+                         fmt::format("MAT1 {}", get_int(1, "the number of a material")), cards_.place());
+    } else if (cards_.name() == "MAT1") {
       read_material();
-    } else if (name_ == "SPC") {
+    } else if (cards_.name() == "SPC") {
       read_spc();
-    } else if (name_ == "SPC1") {
+    } else if (cards_.name() == "SPC1") {
       read_spc1();
-    } else if (name_ == "SPCADD") {
-      for (std::size_t i = 1; i < fields_.size(); ++i)
+    } else if (cards_.name() == "SPCADD") {
+      for (std::size_t i = 1; i < cards_.count(); ++i)
         if (!get(i).empty()) sums_[get_int(0, "the number of a set")].push_back(get_int(i, "the number of a set"));
-    } else if (name_ == "PARAM" && to_upper(get(0)) == "WTMASS") {
+    } else if (cards_.name() == "PARAM" && to_upper(get(0)) == "WTMASS") {
       mass_factor_ = find_real(1, "the factor of masses").value_or(1.0);
-    } else if (name_ == "ENDDATA") {
+    } else if (cards_.name() == "ENDDATA") {
       has_end = true;
     } else {
       read_other();

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "runtime/base/failure.hpp"
+#include "runtime/base/fields.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::base {
@@ -19,12 +20,6 @@ constexpr std::size_t kMaxDepth = 16, kMaxIncludes = 10000;
 constexpr std::string_view kWord = "INCLUDE";
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
-
-std::string_view trim(std::string_view text) {
-  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
-  return text;
-}
 
 std::string_view unquote(std::string_view text) {
   text = trim(text);
@@ -145,6 +140,16 @@ JoinedText join_includes(const fs::path& file, std::string bytes, std::uint64_t 
   Joiner joiner(find_extension(file) == ".inp", max_bytes);
   joiner.add(file, std::move(bytes));
   return joiner.take();
+}
+
+std::string find_place(std::string_view text, const std::string& name, std::span<const TextOrigin> origins, std::size_t place) {
+  place = std::min(place, text.size());
+  const auto after =
+      std::upper_bound(origins.begin(), origins.end(), place, [](std::size_t at, const TextOrigin& origin) { return at < origin.begin; });
+  const TextOrigin whole{0, name, 1};
+  const TextOrigin& origin = after == origins.begin() ? whole : *(after - 1);
+  const auto at = [&](std::size_t position) { return text.begin() + static_cast<std::ptrdiff_t>(position); };
+  return fmt::format("{}:{}", origin.file, origin.first_line + static_cast<std::size_t>(std::count(at(origin.begin), at(place), '\n')));
 }
 
 JoinedText read_joined(const fs::path& file, std::string_view what, std::uint64_t max_bytes) {
