@@ -31,7 +31,7 @@ constexpr std::uint64_t kMaxGlbBytes = 1ULL << 32, kMaxResultBytes = 1ULL << 36;
 
 bool has_results(const fs::path& file) {
   const std::string ending = base::find_extension(file);
-  return ending == ".frd" || ending == ".unv" || ending == ".uff";
+  return ending == ".frd" || ending == ".unv" || ending == ".uff" || ending == ".pch";
 }
 
 bank::Bank import_results(const ImportWishes& wishes, const material::Material* material, std::vector<std::string>& notes) {
@@ -44,11 +44,20 @@ bank::Bank import_results(const ImportWishes& wishes, const material::Material* 
                                .units = wishes.unit == "mm-t-s" ? ModelUnits::kMillimetre : ModelUnits::kMetre,
                                .are_units_given = !wishes.unit.empty()};
   const std::string name = wishes.file.string(), bytes = base::read_file(wishes.file, "file of results", kMaxResultBytes);
-  return make_bank(base::find_extension(wishes.file) == ".frd" ? parse_frd(bytes, name) : parse_unv(bytes, name), name, reading, &notes);
+  const std::string ending = base::find_extension(wishes.file);
+  if (ending == ".pch") {
+    if (wishes.mesh.empty())
+      throw InputError(fmt::format("{}: a punch file has modes, but no mesh; add --mesh MODEL.bdf, the model that was solved", name));
+    return make_bank(parse_pch(bytes, name, base::read_joined(wishes.mesh, "Nastran file", kMaxResultBytes), wishes.mesh.string()), name,
+                     reading, &notes);
+  }
+  if (!wishes.mesh.empty()) throw InputError(fmt::format("--mesh is for Nastran's .pch files; {} has its own mesh: leave it out", name));
+  return make_bank(ending == ".frd" ? parse_frd(bytes, name) : parse_unv(bytes, name), name, reading, &notes);
 }
 
 bank::Bank import_glb(const ImportWishes& wishes, const material::Material* material, std::vector<std::string>& notes) {
   if (!wishes.unit.empty()) throw InputError("--unit is for modes of other solvers; glTF is in metres");
+  if (!wishes.mesh.empty()) throw InputError("--mesh is for Nastran's .pch files; leave it out");
   const GlbReading reading{.model = wishes.model, .ignores_extras = wishes.is_plain, .material = material};
   return parse_glb(base::read_file(wishes.file, "GLB or glTF file", kMaxGlbBytes), wishes.file.string(), reading, &notes);
 }
@@ -184,7 +193,7 @@ void run_export(const ExportWishes& wishes) {
 }
 
 void run_import(const ImportWishes& wishes) {
-  check_other(wishes.file, wishes.out);
+  for (const fs::path& in : {wishes.file, wishes.mesh}) check_other(in, wishes.out);
   const material::Material* const material =
       wishes.material.empty() ? nullptr : &material::MaterialTable::get().require("--material", wishes.material).material;
   std::vector<std::string> notes;

@@ -27,7 +27,8 @@ void run_export(const ExportWishes& wishes);
 
 struct ImportWishes {
   std::filesystem::path file, out;
-  std::string unit;  // of modes of other solvers: "m-kg-s", "mm-t-s"; empty: not given
+  std::filesystem::path mesh;  // of a Nastran punch file
+  std::string unit;            // of modes of other solvers: "m-kg-s", "mm-t-s"; empty: not given
   std::optional<std::size_t> model;
   std::string material;
   bool is_plain = false;

@@ -115,7 +115,7 @@ class FrdReader {
 
   ResultsLines lines_;
   const std::string& name_;
-  ResultsNodes nodes_{lines_};
+  ResultsNodes<ResultsLines> nodes_{lines_};
   SolvedModel model_;
   std::string program_, version_;
   double stiffness_ = 0.0, mass_ = 1.0;

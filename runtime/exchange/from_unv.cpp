@@ -111,11 +111,12 @@ class UnvReader {
   void read_mode(std::string_view numbers) {
     SolvedMode mode;
     const double omega = 2.0 * std::numbers::pi * lines_.number<double>(numbers, 0, 13, "a frequency");
-    mode.mass = lines_.number<double>(numbers, 13, 13, "a modal mass");
+    const double mass = lines_.number<double>(numbers, 13, 13, "a modal mass");
+    mode.mass = mass;
     const double viscous = lines_.number<double>(numbers, 26, 13, "a damping ratio"),
                  hysteretic = lines_.number<double>(numbers, 39, 13, "a hysteretic damping ratio");
     if (!std::isfinite(omega)) lines_.fail("a frequency that is not finite; solve the model again");
-    if (!(mode.mass > 0.0) || !std::isfinite(mode.mass)) lines_.fail("a modal mass of {:g}; write the modes with their masses", mode.mass);
+    if (!(mass > 0.0) || !std::isfinite(mass)) lines_.fail("a modal mass of {:g}; write the modes with their masses", mass);
     if (!(viscous >= 0.0 && viscous < 1.0 && hysteretic >= 0.0 && hysteretic < 1.0))
       lines_.fail("damping ratios of {:g} and {:g}; they lie within 0 and 1", viscous, hysteretic);
     mode.eigenvalue_rad2_s2 = omega * omega;
@@ -134,7 +135,7 @@ class UnvReader {
 
   ResultsLines lines_;
   const std::string& name_;
-  ResultsNodes nodes_{lines_};
+  ResultsNodes<ResultsLines> nodes_{lines_};
   SolvedModel model_;
 };
 

@@ -230,13 +230,15 @@ void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
 
 void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
   app.add_option("FILE", wishes.file,
-                 "GLB or glTF file (.glb, .gltf with its buffers), or modes of CalculiX (.frd) or in a universal file (.unv, .uff)")
+                 "GLB or glTF file (.glb, .gltf with its buffers), or modes of CalculiX (.frd), of Nastran (.pch) or in a universal file "
+                 "(.unv, .uff)")
       ->required();
   app.add_option("-o,--output", wishes.out, "Output bank; -: standard output")->required();
   app.add_option("--model", wishes.model, "Index of the modal model in the file, from 0")
       ->check(base::whole_range(0, kMost), base::describe_whole_range(0, kMost));
   app.add_option("--material", wishes.material,
                  "Material name (carillon materials) for a model without one, and for modes of other solvers");
+  app.add_option("--mesh", wishes.mesh, "Nastran model (.bdf) of which the .pch file has the modes");
   app.add_option("--unit", wishes.unit,
                  "Units of modes of other solvers, m-kg-s or mm-t-s; default: the former, for bodies of at most 10 m")
       ->check(CLI::IsMember({"m-kg-s", "mm-t-s"}));
@@ -351,7 +353,7 @@ void add_commands(CLI::App& app, Options& options) {
   add_import(
       *app.add_subcommand("import",
                           "Imports a GLB or glTF file with KHR_audio_rigid_bodies as a bank, lossless for exported files; or modes of "
-                          "other solvers (.frd, .unv, .uff)"),
+                          "other solvers (.frd, .pch, .unv, .uff)"),
       options.imported);
 }
 

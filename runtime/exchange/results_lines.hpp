@@ -4,16 +4,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "runtime/base/failure.hpp"
+#include "runtime/base/fields.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/vector.hpp"
 
@@ -44,6 +46,15 @@ class ResultsLines {
     return line;
   }
 
+  std::size_t remaining() const { return bytes_.size() - std::min(at_, bytes_.size()); }
+
+  /// The next `count` bytes, which are no text.
+  std::string_view take(std::size_t count, const char* block) {
+    if (count > remaining()) fail("the file ends within {}; it was cut short: write or copy it again", block);
+    at_ += count;
+    return bytes_.substr(at_ - count, count);
+  }
+
   /// Columns `begin` to `begin + width`, without blanks around them.
   static std::string_view cut(std::string_view line, std::size_t begin, std::size_t width) {
     std::string_view field = begin < line.size() ? line.substr(begin, width) : std::string_view();
@@ -52,18 +63,16 @@ class ResultsLines {
     return field;
   }
 
-  /// A number in such columns; the exponent of a real number may be D.
+  /// A number in such columns, as base::find_real and find_int read it.
   template <class T>
   T number(std::string_view line, std::size_t begin, std::size_t width, const char* what) const {
-    const std::string_view whole = cut(line, begin, width);
-    std::string field(whole);
-    if (field.size() > 1 && field[0] == '+') field.erase(0, 1);
-    if constexpr (std::is_floating_point_v<T>) std::replace(field.begin(), field.end(), 'D', 'E');
-    T value{};
-    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-    if (error != std::errc{} || end != field.data() + field.size())
-      fail("expected {}, found '{}'; the file is damaged: write it again", what, base::printable(std::string(whole)));
-    return value;
+    const std::string_view field = cut(line, begin, width);
+    if constexpr (std::is_floating_point_v<T>) {
+      if (const auto value = base::find_real(field)) return *value;
+    } else {
+      if (const auto value = base::find_int(field); value && std::in_range<T>(*value)) return static_cast<T>(*value);
+    }
+    fail("expected {}, found '{}'; the file is damaged: write it again", what, base::printable(field));
   }
 
   /// Three finite numbers.
@@ -82,24 +91,29 @@ class ResultsLines {
   std::size_t at_ = 0, line_number_ = 0;
 };
 
-/// Nodes by their numbers in the file.
+/// Nodes by their numbers in the file. `Lines` throws the errors.
+template <class Lines>
 class ResultsNodes {
  public:
-  explicit ResultsNodes(const ResultsLines& lines) : lines_(lines) {}
+  explicit ResultsNodes(const Lines& lines) : lines_(lines) {}
 
   void add(std::int64_t tag, const Vec3& position, std::vector<Vec3>& nodes) {
     if (nodes.size() >= kMaxResultNodes) lines_.fail("more than {} nodes", kMaxResultNodes);
     if (!index_of_.try_emplace(tag, nodes.size()).second) lines_.fail("node {} is defined a second time; write the file again", tag);
     nodes.push_back(position);
   }
-  std::size_t find(std::int64_t tag) const {
+  std::optional<std::size_t> look_up(std::int64_t tag) const {
     const auto found = index_of_.find(tag);
-    if (found == index_of_.end()) lines_.fail("node {} is not among the nodes of the file; write it again", tag);
-    return found->second;
+    return found == index_of_.end() ? std::nullopt : std::optional(found->second);
+  }
+  std::size_t find(std::int64_t tag) const {
+    const auto found = look_up(tag);
+    if (!found) lines_.fail("node {} is not among the nodes of the file; write it again", tag);
+    return *found;
   }
 
  private:
-  const ResultsLines& lines_;
+  const Lines& lines_;
   std::unordered_map<std::int64_t, std::size_t> index_of_;
 };
 

@@ -1,5 +1,5 @@
 // Method: outer faces are those of one tetrahedron; the faces of ten-node tetrahedra become four flat triangles. Shapes are divided by the
-//   root of the generalised mass.
+//   root of the generalised mass, of the file or by the density.
 #include "runtime/exchange/solved_model.hpp"
 
 #include <fmt/format.h>
@@ -19,8 +19,10 @@
 namespace carillon::exchange {
 namespace {
 
-constexpr double kRigidShare = 1e-8;                                                               // of the highest eigenvalue
-constexpr double kLargestUnits = 10.0;                                                             // of a body whose units are not given
+constexpr double kRigidShare = 1e-8;     // of the highest eigenvalue
+constexpr double kTonnesPerMm3 = 1e-12;  // of a kg/m^3
+constexpr double kUnitMass = 0.1;        // largest distance of a mass-normalised mode from 1
+constexpr double kLargestUnits = 10.0;   // of a body whose units are not given
 constexpr std::array<std::array<int, 3>, 4> kFaces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};  // outward
 
 /// Position of the mid node of an edge among the nodes of a ten-node tetrahedron.
@@ -83,6 +85,21 @@ std::vector<std::size_t> choose_modes(const SolvedModel& model, const std::strin
   return chosen;
 }
 
+/// (modes) Generalised masses: those of the file, else by the density in the units of the model.
+std::vector<double> find_masses(const SolvedModel& model, double density, const std::string& name) {
+  if (!model.modes.front().mass) {
+    std::vector<double> masses = calc_generalised_masses(model, density);
+    for (std::size_t m = 0; m < masses.size(); ++m)
+      if (!(masses[m] > 0.0) || !std::isfinite(masses[m]))
+        throw InputError(
+            fmt::format("{}: mode {} has a generalised mass of {:g}; write the displacements of all nodes", name, m + 1, masses[m]));
+    return masses;
+  }
+  std::vector<double> masses;
+  for (const SolvedMode& mode : model.modes) masses.push_back(mode.mass.value_or(1.0));
+  return masses;
+}
+
 void check_size(const bank::Bank& bank, const std::string& name, const ResultsReading& reading) {
   double largest = 0.0;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -139,13 +156,21 @@ bank::Bank make_bank(const SolvedModel& model, const std::string& name, const Re
   const std::size_t modes = chosen.size(), rigid = model.modes.size() - modes;
   std::vector<std::string> said;
   if (rigid > 0) said.push_back(fmt::format("{} rigid modes were left out", rigid));
+  const std::vector<double> masses = find_masses(model, is_mm ? kTonnesPerMm3 * material.density_kg_m3 : material.density_kg_m3, name);
+  if (const auto [least, most] = std::minmax_element(masses.begin(), masses.end());
+      !model.modes.front().mass && (*least < 1.0 - kUnitMass || *most > 1.0 + kUnitMass))
+    said.push_back(
+        fmt::format("generalised masses of {:.3g} to {:.3g} by the density of {}; if the modes were written with masses of 1, correct "
+                    "--material or --unit",
+                    *least, *most, material.name));
   std::vector<double> shapes(3 * modes * used.size());
   for (std::size_t m = 0; m < modes; ++m) {
     const SolvedMode& mode = model.modes[chosen[m]];
     bank.eigenvalue_rad2_s2.push_back(mode.eigenvalue_rad2_s2);
     bank.decay_per_s.push_back(mode.decay_per_s.value_or(bank::calc_decay(bank.damping, bank.material, bank.eigenvalue_rad2_s2.back())));
     for (std::size_t v = 0; v < used.size(); ++v)
-      for (std::size_t c = 0; c < 3; ++c) shapes[(v * modes + m) * 3 + c] = per_root_kg / std::sqrt(mode.mass) * mode.shape[used[v]][c];
+      for (std::size_t c = 0; c < 3; ++c)
+        shapes[(v * modes + m) * 3 + c] = per_root_kg / std::sqrt(masses[chosen[m]]) * mode.shape[used[v]][c];
   }
   if (std::any_of(model.modes.begin(), model.modes.end(), [](const SolvedMode& mode) { return mode.decay_per_s.has_value(); })) {
     bank.damping = {};

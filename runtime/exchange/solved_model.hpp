@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/base/includes.hpp"
 #include "runtime/material/material.hpp"
 
 namespace carillon::exchange {
@@ -23,9 +24,10 @@ struct ResultsReading {
 
 /// A real mode in the units of the model.
 struct SolvedMode {
-  double eigenvalue_rad2_s2 = 0.0, mass = 1.0;  // generalised mass: shapes are divided by its root
-  std::optional<double> decay_per_s;            // of its amplitude; nullopt: that of the material
-  std::vector<Vec3> shape;                      // (nodes)
+  double eigenvalue_rad2_s2 = 0.0;
+  std::optional<double> mass = 1.0;   // generalised: shapes are divided by its root; nullopt: by the density of the material
+  std::optional<double> decay_per_s;  // of its amplitude; nullopt: that of the material
+  std::vector<Vec3> shape;            // (nodes)
 };
 
 struct SolvedModel {
@@ -41,6 +43,13 @@ bank::Bank make_bank(const SolvedModel& model, const std::string& name, const Re
 
 /// CalculiX (.frd of *FREQUENCY with *NODE FILE, U). Throws InputError "name:line: ...".
 SolvedModel parse_frd(std::string_view bytes, const std::string& name);
+
+/// Nastran: real eigenvectors of a punch file (.pch, SORT1) on the grids and tetrahedra of a bulk data file (.bdf). The file names no
+/// generalised masses. Throws InputError "name:line: ..." of the file at fault.
+SolvedModel parse_pch(std::string_view bytes, const std::string& name, const base::JoinedText& mesh, const std::string& mesh_name);
+
+/// (modes) Integral of density times squared shape over the tetrahedra, in the units of the model.
+std::vector<double> calc_generalised_masses(const SolvedModel& model, double density);
 
 /// Universal files (.unv, .uff): nodes (dataset 2411), elements (2412) and real normal modes (55). Throws InputError "name:line: ...".
 SolvedModel parse_unv(std::string_view bytes, const std::string& name);

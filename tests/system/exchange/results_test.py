@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Modes of other solvers as a bank: a bar by ccx, imported, against our own solve of the same mesh: frequencies within 0.5 cents, the
 rendered level within 0.01 dB; one bank from metres and from millimetres; the same modes in a universal file, with masses and damping of
-their own; damaged and cut files are named.
+their own, and in a Nastran punch file, with and without masses of 1; damaged and cut files are named.
 
 usage: results_test.py BIN_DIR
 """
@@ -151,6 +151,106 @@ def check_universal(folder, nodes, tets):
         assert "cut.unv" in said, f"{cut}: {said}"
 
 
+def format_exponent(kind, value, digits=10):
+    """A field of 18 columns: 1.0E-03, 1.0D-03 or 1.0-3."""
+    text = "%.*E" % (digits, value)
+    return (text if kind == "E" else text.replace("E", "D") if kind == "D" else text.replace("E-0", "-").replace("E+0", "+")).rjust(18)
+
+
+def write_punch(path, modes, scales, exponent="E", extra=()):
+    """Blocks of eigenvectors in SORT1, numbered in columns 73 to 80; extra: lines of other results between them."""
+    lines = []
+    for k, ((freq, shape), scale) in enumerate(zip(modes, scales), 1):
+        lines += ["$TITLE   = BAR", "$SUBTITLE=", "$LABEL   =", "$EIGENVECTOR", "$REAL OUTPUT", "$SUBCASE ID =           1"]
+        lines.append("$EIGENVALUE = %s  MODE = %5d" % (format_exponent(exponent, (2 * math.pi * freq) ** 2).strip(), k))
+        for node, u in sorted(shape.items()):
+            lines.append("%10d       G" % node + "".join(format_exponent(exponent, scale * x) for x in u))
+            lines.append("-CONT-            " + "".join(format_exponent(exponent, x) for x in (0, 0.5, -1)))
+        lines += ["         7       S" + format_exponent(exponent, 3.0) + " " * 36, "-CONT-" + " " * 66]  # a scalar point
+        lines += extra
+    path.write_text("".join("%-72s%8d\n" % (line, number) for number, line in enumerate(lines, 1)))
+
+
+def check_punch(folder, nodes, tets):
+    _, modes = cae.read_frd(folder / "m.frd")
+    expected = read_bank(folder / "m.hdf")
+    levels = measure_levels(folder, "m.hdf", expected[0])
+    (folder / "model.bdf").write_text(cae.format_nastran(nodes, tets))
+    half = len(nodes) // 2
+    cards = (folder / "model.bdf").read_text().split("GRID*   ")
+    (folder / "nodes.dat").write_text("".join("GRID*   " + card for card in cards[1:half]))
+    (folder / "parts.bdf").write_text(
+        cards[0] + "INCLUDE 'nodes.dat'\nGRID,900001,,9.,9.,9.\n" + "".join("GRID*   " + c for c in cards[half:])
+    )
+    import_ = ["import", "--material", "ccx steel", "-o", "pch.hdf", "--mesh"]
+    forces = [
+        "$TITLE   =",
+        "$SPCF",
+        "$REAL OUTPUT",
+        "         1       G" + "      1.000000E+00" * 3,
+        "-CONT-            " + "      1.000000E+00" * 3,
+    ]
+    peaks = [1 / max(abs(x) for u in shape.values() for x in u) for _, shape in modes]
+    unit = [1.0] * len(modes)
+    for name, mesh, scales, exponent, extra in (
+        ("mass", "model.bdf", unit, "E", ()),
+        ("none", "parts.bdf", unit, "", forces),
+        ("max", "model.bdf", peaks, "D", ()),
+    ):
+        write_punch(folder / f"{name}.pch", modes, scales, exponent, extra)
+        said = run(folder, BIN / "carillon-bank", *import_, mesh, f"{name}.pch")
+        assert ("generalised masses" in said) == (name == "max"), said
+        run(folder, BIN / "carillon-bank", "check", "pch.hdf")
+        found = read_bank(folder / "pch.hdf")
+        cents = abs(1200 * numpy.log2(found[0] / expected[0])).max()
+        assert cents < 1e-4 and found[1].shape == expected[1].shape, f"{name}: {cents}"
+        differ = abs(measure_levels(folder, "pch.hdf", found[0]) - levels)[levels > levels.max() - 60]
+        assert differ.max() < 0.005, f"{name}: {differ}"
+        print(f"{name}.pch: {cents:.1e} cents, levels within {differ.max():.4f} dB")
+    said = run(folder, BIN / "carillon-bank", "info", "pch.hdf")
+    assert "imported from a Nastran punch file" in said, said
+
+    text, mesh = (folder / "mass.pch").read_text(), (folder / "model.bdf").read_text()
+    first, second = text.index("$EIGENVALUE"), text.index("$TITLE", 10)
+    is_tet = mesh.index("CTETRA")
+    damages = {
+        "sort2": (text[:first] + "$POINT ID =   1\n" + text[first:], mesh, "sort2.pch:7: eigenvectors by point (SORT2)"),
+        "complex": (text.replace("$REAL OUTPUT          ", "$REAL-IMAGINARY OUTPUT", 1), mesh, "complex.pch:5: complex eigenvectors"),
+        "subcases": (text[:second] + text[second:].replace("ID =           1", "ID =           2", 1), mesh, "modes of subcase 2"),
+        "word": (text.replace("         2       G", "       two       G", 1), mesh, "word.pch:10: expected the number of a node"),
+        "lost": (text.replace("         2       G", "    999999       G", 1), mesh, "node 999999 is not in lost.bdf"),
+        "twice": (text.replace("         2       G", "         1       G", 1), mesh, "node 1 a second time"),
+        "missing": (text.replace("         2       G", "         2       S", 1), mesh, f"of {len(nodes)} nodes"),
+        "no_cont": (text.replace("-CONT-", "-CUNT-", 1), mesh, "no_cont.pch:9: expected a line -CONT-"),
+        "value": (text.replace("EIGENVALUE = ", "EIGENVALUE = x", 1), mesh, "value.pch:7: expected an eigenvalue"),
+        "forces": (text.replace("$EIGENVECTOR", "$SPCF       "), mesh, "no real eigenvectors"),
+        "hexahedron": (text, mesh.replace("CTETRA", "CHEXA ", 1), "hexahedron.bdf:"),
+        "system": (text, mesh[:is_tet] + "GRID,900002,3,1.,1.,1.\n" + mesh[is_tet:], "coordinate system 3"),
+        "axes": (text, mesh[:is_tet] + "GRID,900002,,1.,1.,1.,4\n" + mesh[is_tet:], "coordinate system 4"),
+        "no_end": (text, mesh.replace("ENDDATA\n", ""), "no_end.bdf:"),
+        "undefined": (text, mesh.replace("GRID*                  2", "GRID*              77777", 1), "node 2 of this element"),
+        "surface": (text, mesh.replace("CTETRA", "PLOTEL"), "no tetrahedra"),
+    }
+    for name, (data, model, words) in damages.items():
+        (folder / f"{name}.pch").write_text(data)
+        (folder / f"{name}.bdf").write_text(model)
+        said = run(folder, BIN / "carillon-bank", "import", f"{name}.pch", "--mesh", f"{name}.bdf", *import_[1:3], "-o", "x.hdf", code=2)
+        assert words in said, f"{name}: {said}"
+    for cut in range(7, len(text) - 8, len(text) // 40):
+        if cut % 81 == 0 and text[:cut].count("$EIGENVALUE") == text[:cut].count("       S  "):
+            continue  # whole blocks
+        (folder / "cut.pch").write_text(text[:cut])
+        said = run(folder, BIN / "carillon-bank", *import_[:3], "--mesh", "model.bdf", "cut.pch", "-o", "x.hdf", code=2)
+        assert "cut.pch" in said, f"{cut}: {said}"
+    for words, said in (
+        (["mass.pch"], "--mesh MODEL.bdf"),
+        (["m.frd", "--mesh", "model.bdf"], "--mesh is for Nastran"),
+        (["mass.pch", "--mesh", "nowhere.bdf"], "nowhere.bdf"),
+    ):
+        assert said in run(folder, BIN / "carillon-bank", "import", *words, "--material", "ccx steel", "-o", "x.hdf", code=2), words
+    assert not (folder / "x.hdf").exists()
+
+
 def check_refusals(folder):
     text = (folder / "m.frd").read_bytes()
     said = run(folder, BIN / "carillon-bank", "import", "m.frd", "-o", "x.hdf", code=2)
@@ -226,6 +326,7 @@ def main():
         print(f"{cents:.3f} cents, levels within {differ.max():.4f} dB")
         check_comparison(folder)
         check_universal(folder, nodes, tets)
+        check_punch(folder, nodes, tets)
         check_refusals(folder)
 
 

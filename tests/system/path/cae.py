@@ -195,4 +195,5 @@ def main():
             assert "Steel" in said and "*BOUNDARY" in said and "mm, t, s" in said, said
 
 
-main()
+if __name__ == "__main__":
+    main()
