@@ -4,12 +4,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <map>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/corrected.hpp"
 #include "runtime/bank/reduce.hpp"
 #include "runtime/bank/write.hpp"
 #include "runtime/base/error.hpp"
@@ -17,7 +19,9 @@
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
 #include "runtime/exchange/faust.hpp"
+#include "runtime/exchange/frf.hpp"
 #include "runtime/exchange/glb.hpp"
+#include "runtime/exchange/measured.hpp"
 #include "runtime/exchange/sofa.hpp"
 #include "runtime/exchange/solved_model.hpp"
 #include "runtime/material/table.hpp"
@@ -68,8 +72,11 @@ std::string find_format(const ExportWishes& wishes) {
   if (ending == ".glb") return "glb";
   if (ending == ".dsp") return "faust";
   if (ending == ".sofa") return "sofa";
+  if (ending == ".uff" || ending == ".unv") return "uff";
   throw InputError(fmt::format(
-      "{}: GLB files end in .glb, Faust programs in .dsp, SOFA files in .sofa; rename the output, or give --format", wishes.out.string()));
+      "{}: GLB files end in .glb, Faust programs in .dsp, SOFA files in .sofa, frequency responses in .uff; rename the output, or give "
+      "--format",
+      wishes.out.string()));
 }
 
 /// "0.01,0,0.05"
@@ -122,15 +129,17 @@ void check_other(const fs::path& in, const fs::path& out) {
 
 /// Throws InputError for options that are given and belong to other formats.
 void check_options(const ExportWishes& wishes, const std::string& format) {
-  const std::map<std::string, std::string> names{{"glb", "GLB"}, {"faust", "Faust"}, {"sofa", "SOFA"}};
+  const std::map<std::string, std::string> names{{"glb", "GLB"}, {"faust", "Faust"}, {"sofa", "SOFA"}, {"uff", "UFF"}};
   const struct {
     bool is_given;
     const char* option;
     std::vector<std::string> formats;
-  } options[] = {{wishes.modes.has_value(), "--modes", {"GLB", "Faust"}}, {!wishes.points.empty(), "--points", {"Faust"}},
+  } options[] = {{wishes.modes.has_value(), "--modes", {"GLB", "Faust"}}, {!wishes.points.empty(), "--points", {"Faust", "UFF"}},
                  {wishes.radiation != "auto", "--radiation", {"Faust"}},  {wishes.is_z_up, "--up", {"GLB"}},
-                 {!wishes.strike.empty(), "--strike", {"SOFA"}},          {wishes.has_bands, "--bands", {"SOFA"}},
-                 {wishes.step_deg.has_value(), "--step", {"SOFA"}},       {wishes.distance_m.has_value(), "--distance", {"SOFA"}}};
+                 {!wishes.strike.empty(), "--strike", {"SOFA", "UFF"}},   {wishes.has_bands, "--bands", {"SOFA"}},
+                 {wishes.step_deg.has_value(), "--step", {"SOFA"}},       {wishes.distance_m.has_value(), "--distance", {"SOFA"}},
+                 {!wishes.quantity.empty(), "--quantity", {"UFF"}},       {wishes.spacing_hz.has_value(), "--spacing", {"UFF"}},
+                 {wishes.highest_hz.has_value(), "--to", {"UFF"}}};
   const std::string& name = names.at(format);
   for (const auto& one : options)
     if (one.is_given && std::find(one.formats.begin(), one.formats.end(), name) == one.formats.end())
@@ -154,6 +163,62 @@ void export_sofa(const bank::Bank& bank, const ExportWishes& wishes, const std::
              1e-6 * static_cast<double>(file.bytes.size()));
 }
 
+/// Functions of every point along x, y and z, per force at the struck point along the axis nearest to its inward normal.
+FrfSet make_frfs(const bank::Bank& bank, const ExportWishes& wishes) {
+  constexpr std::size_t kMostValues = 20'000'000;
+  if (wishes.strike.empty() && wishes.points.empty())
+    throw InputError("frequency responses need a struck point and points of response: --strike X,Y,Z --points X,Y,Z ...");
+  const bank::Bank played = bank::calc_corrected(bank);
+  std::vector<FrfPoint> points;
+  for (const std::string& word : wishes.points) points.push_back(find_frf_point(played, read_point("--points", word)));
+  FrfPoint struck = wishes.strike.empty() ? points.front() : find_frf_point(played, read_point("--strike", wishes.strike));
+  if (points.empty()) points.push_back(struck);
+  FrfSet set;
+  for (std::size_t p = 0; p < points.size(); ++p) set.nodes_m[static_cast<std::int64_t>(p + 1)] = points[p].point_m;
+  const auto same = std::find_if(points.begin(), points.end(), [&](const FrfPoint& point) { return point.point_m == struck.point_m; });
+  const auto reference = static_cast<std::int64_t>(same - points.begin() + 1);
+  set.nodes_m[reference] = struck.point_m;
+  const Motion motion = wishes.quantity == "displacement" ? Motion::kDisplacement
+                        : wishes.quantity == "velocity"   ? Motion::kVelocity
+                                                          : Motion::kAcceleration;
+  const double step = std::stod(fmt::format("{:.5e}", wishes.spacing_hz.value_or(1.0)));  // six digits, as written
+  const double count = std::floor(wishes.highest_hz.value_or(bank.band_hz[1]) / step * (1.0 + 1e-12));
+  if (!(count >= 1.0))
+    throw InputError(fmt::format("--spacing {:g}: there is no line below the end of the band; give a smaller one", step));
+  if (count * 3.0 * static_cast<double>(points.size()) > static_cast<double>(kMostValues))
+    throw InputError(fmt::format("{:.0f} lines of {} functions are more than {} values; give a larger --spacing or a lower --to", count,
+                                 3 * points.size(), kMostValues));
+  std::vector<double> freq_hz;
+  for (std::size_t i = 1; i <= static_cast<std::size_t>(count); ++i) freq_hz.push_back(step * static_cast<double>(i));
+  const int struck_direction = find_direction(struck.inward);
+  for (std::size_t p = 0; p < points.size(); ++p)
+    for (int direction = 1; direction <= 3; ++direction)
+      set.frfs.push_back(
+          {.response_node = static_cast<std::int64_t>(p + 1),
+           .reference_node = reference,
+           .response_direction = direction,
+           .reference_direction = struck_direction,
+           .motion = motion,
+           .freq_hz = freq_hz,
+           .value = calc_frf(played, points[p], find_axis(direction), struck, find_axis(struck_direction), motion, freq_hz)});
+  return set;
+}
+
+void export_frfs(const bank::Bank& bank, const ExportWishes& wishes, const std::string& name, std::FILE* notes) {
+  FrfSet set;
+  try {
+    set = make_frfs(bank, wishes);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", wishes.bank.string(), error.what()));
+  }
+  write_output(wishes.out, "universal file", [&](const auto& sink) { sink(format_frfs(set, name)); });
+  const Frf& first = set.frfs.front();
+  constexpr std::array<const char*, 7> kAxes{"-z", "-y", "-x", "", "x", "y", "z"};
+  fmt::print(notes, "uff       {} functions of {} lines, {:g} to {:g} Hz; force at node {} along {}{}\n", set.frfs.size(),
+             first.freq_hz.size(), first.freq_hz.front(), first.freq_hz.back(), first.reference_node,
+             kAxes[static_cast<std::size_t>(first.reference_direction + 3)], bank.counts.rigid_modes == 6 ? "; with the rigid body" : "");
+}
+
 }  // namespace
 
 void run_export(const ExportWishes& wishes) {
@@ -165,6 +230,7 @@ void run_export(const ExportWishes& wishes) {
   bank::Bank bank = bank::read_bank(wishes.bank);
   if (bank.mode_count() == 0) throw InputError(fmt::format("{}: the bank has no modes, hence no sound", wishes.bank.string()));
   if (format == "sofa") return export_sofa(bank, wishes, name, notes);
+  if (format == "uff") return export_frfs(bank, wishes, name, notes);
   if (format == "glb") {
     const std::size_t modes = bank.mode_count();
     if (wishes.modes) bank = bank::calc_reduced(bank, {.modes = wishes.modes});
@@ -190,6 +256,16 @@ void run_export(const ExportWishes& wishes) {
       std::isfinite(program.left_out_db) ? fmt::format("; the other modes are {:.1f} dB(A) below the total", -program.left_out_db) : "");
   for (std::size_t p = 0; p < program.points_m.size(); ++p)
     fmt::print(notes, "point {:<4}{:.5g}, {:.5g}, {:.5g} m\n", p, program.points_m[p][0], program.points_m[p][1], program.points_m[p][2]);
+}
+
+void run_measured(const MeasuredWishes& wishes) {
+  const std::string name = wishes.measured.string();
+  const bank::Bank played = bank::calc_corrected(bank::read_bank(wishes.bank));
+  const FrfSet measured = parse_frfs(base::read_file(wishes.measured, "universal file", kMaxResultBytes), name);
+  const MeasuredComparison found = compare_measured(played, measured, wishes.modes, wishes.within_cents, name);
+  if (!wishes.picture.empty())
+    base::write_file(wishes.picture, format_picture(found, played, base::printable(wishes.bank.string()), base::printable(name)));
+  fmt::print("{}", wishes.has_json ? format_json(found, played) : base::printable_lines(format_table(found, played)));
 }
 
 void run_import(const ImportWishes& wishes) {

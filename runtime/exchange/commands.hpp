@@ -10,16 +10,19 @@ namespace carillon::exchange {
 
 struct ExportWishes {
   std::filesystem::path bank, out;
-  std::string format;                // "glb", "faust", "sofa"; empty: by the extension of `out`
+  std::string format;                // "glb", "faust", "sofa", "uff"; empty: by the extension of `out`
   std::optional<std::size_t> modes;  // default: all (glb), FaustOptions::modes (faust)
   std::vector<std::string> points;   // "X,Y,Z" in metres, or a single count
   std::string radiation = "auto";
   std::string name;  // empty: stem of the bank's file
   bool is_z_up = false;
+  std::string strike;  // SOFA, frequency responses: "X,Y,Z" in metres; empty: none
   // SOFA.
-  std::string strike;  // "X,Y,Z" in metres; empty: none
   bool has_bands = false;
   std::optional<double> step_deg, distance_m;
+  // Frequency responses.
+  std::string quantity;  // "acceleration", "velocity", "displacement"; empty: the first
+  std::optional<double> spacing_hz, highest_hz;
 };
 
 /// Writes the file and prints a summary to standard output (to standard error if the file goes there). Throws InputError.
@@ -33,6 +36,17 @@ struct ImportWishes {
   std::string material;
   bool is_plain = false;
 };
+
+struct MeasuredWishes {
+  std::filesystem::path bank, measured;
+  std::size_t modes = 0;
+  double within_cents = 0.0;
+  std::filesystem::path picture;  // empty: none
+  bool has_json = false;
+};
+
+/// Compares a bank with the frequency responses of a universal file: table or JSON on standard output. Throws InputError.
+void run_measured(const MeasuredWishes& wishes);
 
 /// Imports a GLB file, or modes of another solver, as a bank. Throws InputError.
 void run_import(const ImportWishes& wishes);

@@ -1,72 +1,25 @@
 // Method: shapes at the vertices of the first bank, weighted by the area around them; of the second by linear interpolation at the nearest
-//   points of its surface. Assignment by shortest augmenting paths.
-// Source: Allemang 2003, "The modal assurance criterion"; Kuhn 1955, Jonker and Volgenant 1987 (assignment).
+//   points of its surface.
+// Source: Allemang 2003, "The modal assurance criterion".
 #include "runtime/exchange/compare.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "runtime/bank/nearest.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/json.hpp"
+#include "runtime/exchange/assign.hpp"
+#include "runtime/exchange/svg.hpp"
 
 namespace carillon::exchange {
 namespace {
 
 constexpr double kLeastMac = 0.5;
 constexpr double kFarthestShare = 0.1;  // of the extent
-
-/// Column of each row, with the least sum of costs; rows <= columns. `cost`: (rows, columns).
-std::vector<std::size_t> assign(const std::vector<double>& cost, std::size_t rows, std::size_t columns) {
-  constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
-  std::vector<double> row_price(rows + 1, 0.0), column_price(columns + 1, 0.0);
-  std::vector<std::size_t> row_of(columns + 1, kNone), before(columns + 1, columns);
-  for (std::size_t row = 0; row < rows; ++row) {
-    std::size_t column = columns;  // an extra one, from which the path begins
-    row_of[column] = row;
-    std::vector<double> least(columns, std::numeric_limits<double>::infinity());
-    std::vector<char> is_done(columns + 1, 0);
-    do {
-      is_done[column] = 1;
-      const std::size_t at = row_of[column];
-      std::size_t next = columns;
-      double step = std::numeric_limits<double>::infinity();
-      for (std::size_t c = 0; c < columns; ++c) {
-        if (is_done[c] != 0) continue;
-        const double reduced = cost[at * columns + c] - row_price[at] - column_price[c];
-        if (reduced < least[c]) {
-          least[c] = reduced;
-          before[c] = column;
-        }
-        if (least[c] < step) {
-          step = least[c];
-          next = c;
-        }
-      }
-      for (std::size_t c = 0; c <= columns; ++c) {
-        if (is_done[c] != 0) {
-          row_price[row_of[c]] += step;
-          column_price[c] -= step;
-        } else if (c < columns) {
-          least[c] -= step;
-        }
-      }
-      column = next;
-    } while (row_of[column] != kNone);
-    while (column != columns) {
-      row_of[column] = row_of[before[column]];
-      column = before[column];
-    }
-  }
-  std::vector<std::size_t> column_of(rows, kNone);
-  for (std::size_t c = 0; c < columns; ++c)
-    if (row_of[c] != kNone) column_of[row_of[c]] = c;
-  return column_of;
-}
 
 /// (V) a third of the triangles around each vertex [m^2].
 std::vector<double> calc_areas(const bank::Bank& bank) {
@@ -202,16 +155,8 @@ std::string format_picture(const Comparison& comparison, const std::string& firs
   const std::size_t rows = comparison.first_count, columns = comparison.second_count;
   const double cell = std::clamp(600.0 / static_cast<double>(std::max<std::size_t>({rows, columns, 1})), 2.0, 30.0), margin = 50.0;
   const double width = margin + cell * static_cast<double>(columns) + 20.0, height = margin + cell * static_cast<double>(rows) + 20.0;
-  const auto escape = [](const std::string& name) {
-    std::string text;
-    for (const char c : name) text += c == '&' ? "&amp;" : c == '<' ? "&lt;" : std::string(1, c);
-    return text;
-  };
-  std::string text = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 0 {0:.0f} {1:.0f}\" "
-      "font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
-      "<text x=\"{2:.0f}\" y=\"16\">MAC: modes of {3} to the right, of {4} downwards</text>\n",
-      std::max(width, 400.0), height, 8.0, escape(second_name), escape(first_name));
+  std::string text =
+      begin_svg(std::max(width, 400.0), height, fmt::format("MAC: modes of {} to the right, of {} downwards", second_name, first_name));
   const auto square = [&](std::size_t i, std::size_t j, const std::string& style) {
     text += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" {}/>\n", margin + cell * static_cast<double>(j),
                         margin + cell * static_cast<double>(i), cell, cell, style);

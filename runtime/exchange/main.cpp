@@ -43,6 +43,7 @@ using namespace carillon;
 
 constexpr int kMost = std::numeric_limits<int>::max();
 constexpr int kMostCompared = 2000;
+constexpr double kWithinCents = 200.0;
 const CLI::Validator kCounts(base::whole_range(1, kMost), base::describe_whole_range(1, kMost));
 
 /// Prints all checks, then throws InputError if there was a fault. `original`: source of a packed bank, or empty.
@@ -208,11 +209,13 @@ void take_material(const bank::Bank& bank, Wishes& wishes) {
 
 void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
   app.add_option("BANK", wishes.bank, "Bank file")->required();
-  app.add_option("-o,--output", wishes.out, "Output file, .glb, .dsp or .sofa; -: standard output")->required();
-  app.add_option("--format", wishes.format, "glb, faust or sofa; default: by the file name")
-      ->check(CLI::IsMember({"glb", "faust", "sofa"}));
+  app.add_option("-o,--output", wishes.out, "Output file, .glb, .dsp, .sofa or .uff; -: standard output")->required();
+  app.add_option("--format", wishes.format, "glb, faust, sofa or uff; default: by the file name")
+      ->check(CLI::IsMember({"glb", "faust", "sofa", "uff"}));
   app.add_option("--modes", wishes.modes, "Number of modes, the most audible ones; default: all (glb), 100 (faust)")->check(kCounts);
-  app.add_option("--points", wishes.points, "Strike points (faust): X,Y,Z in metres each; or their number (4)")->option_text("X,Y,Z ...");
+  app.add_option("--points", wishes.points,
+                 "Strike points (faust) or points of response (uff): X,Y,Z in metres each; faust: or their number (4)")
+      ->option_text("X,Y,Z ...");
   app.add_option("--radiation", wishes.radiation, "Radiation model (faust), as \"radiation\" in a scene")
       ->check(CLI::IsMember(radiation::kGainKindNames))
       ->capture_default_str();
@@ -221,11 +224,17 @@ void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
          "--up", [&wishes](const std::string& axis) { wishes.is_z_up = axis == "z"; },
          "Axis of the body that is up in the other program (glb), y or z; default: y")
       ->check(CLI::IsMember({"y", "z"}));
-  app.add_option("--strike", wishes.strike, "Struck point (sofa), for a blow of 1 N s; default: unit modal velocities")
+  app.add_option(
+         "--strike", wishes.strike,
+         "Struck point: of a blow of 1 N s (sofa; default: unit modal velocities), of the force (uff; default: the first of --points)")
       ->option_text("X,Y,Z");
   app.add_flag("--bands", wishes.has_bands, "Third octaves of that blow (sofa) instead of modes");
   app.add_option("--step", wishes.step_deg, "Degrees between receivers (sofa), a divisor of 180; default: 10");
   app.add_option("--distance", wishes.distance_m, "Distance of the receivers (sofa) from the centre of the body [m]; default: 1");
+  app.add_option("--quantity", wishes.quantity, "Motion per force (uff): acceleration, velocity or displacement; default: the first")
+      ->check(CLI::IsMember({"acceleration", "velocity", "displacement"}));
+  app.add_option("--spacing", wishes.spacing_hz, "Hz between the lines (uff), and of the first; default: 1")->check(CLI::Range(1e-4, 1e6));
+  app.add_option("--to", wishes.highest_hz, "Highest frequency (uff) [Hz]; default: end of the bank's band")->check(CLI::Range(1e-4, 1e6));
 }
 
 void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
@@ -305,6 +314,7 @@ struct Options {
   std::string file, original, packed, unpacked, edited, second, picture;
   bool json = false, csv = false, all = false, keep_numbers = false;
   std::size_t modes = 20, compared_modes = 50;
+  std::optional<double> within_cents;
   double error_db = bank::kPackError;
   Wishes wishes;
   exchange::ExportWishes exported;
@@ -322,13 +332,19 @@ void add_commands(CLI::App& app, Options& options) {
   info->add_flag("--csv", options.csv, "Modes only, as CSV")->excludes(as_json);
   info->add_flag("--all", options.all, "Add the record of the run: versions, seconds, memory, partition, solver");
   info->add_option("--modes", options.modes, "Rows of the mode table")->capture_default_str();
-  CLI::App* comparison = add("compare", "Compares the modes of two banks of a body: pairs, cents, shapes (MAC), levels", "First bank");
-  comparison->add_option("SECOND", options.second, "Second bank")->required();
+  CLI::App* comparison =
+      add("compare",
+          "Compares the modes of two banks of a body, or of a bank and measured frequency responses (.uff): pairs, cents, "
+          "shapes (MAC), levels",
+          "First bank");
+  comparison->add_option("SECOND", options.second, "Second bank, or a universal file with dataset 58 (.uff, .unv)")->required();
   comparison->add_option("--modes", options.compared_modes, "Lowest modes of each that are compared")
       ->check(base::whole_range(1, kMostCompared), base::describe_whole_range(1, kMostCompared))
       ->capture_default_str();
+  comparison->add_option("--within", options.within_cents, "Largest distance of a peak from its mode [cents]; default: 200")
+      ->check(CLI::Range(0.01, 2400.0));
   comparison->add_flag("--json", options.json, "As JSON, with the whole MAC");
-  comparison->add_option("--picture", options.picture, "Write the MAC as a picture to this file (.svg)");
+  comparison->add_option("--picture", options.picture, "Write the MAC, or the responses, as a picture to this file (.svg)");
   add("check", "Checks a bank, one line per property; exit code 0 if valid, else 2")
       ->add_option("--original", options.original, "Original of a packed bank, to measure its error again");
   CLI::App* pack = add("pack", "Compresses a bank with a stated error, for web pages and games");
@@ -348,7 +364,8 @@ void add_commands(CLI::App& app, Options& options) {
   add_export(
       *app.add_subcommand(
           "export",
-          "Exports to GLB (mesh and modes, KHR_audio_rigid_bodies), Faust (the loudest modes at a few points) or SOFA (directivity)"),
+          "Exports to GLB (mesh and modes, KHR_audio_rigid_bodies), Faust (the loudest modes at a few points), SOFA (directivity) or UFF "
+          "(frequency responses)"),
       options.exported);
   add_import(
       *app.add_subcommand("import",
@@ -358,13 +375,20 @@ void add_commands(CLI::App& app, Options& options) {
 }
 
 void run_compare(const Options& options) {
+  if (!options.picture.empty() && base::find_extension(options.picture) != ".svg")
+    throw InputError(fmt::format("--picture {}: the picture is SVG; give it a name that ends in .svg", options.picture));
+  if (const std::string ending = base::find_extension(options.second); ending == ".uff" || ending == ".unv")
+    return exchange::run_measured({.bank = options.file,
+                                   .measured = options.second,
+                                   .modes = options.compared_modes,
+                                   .within_cents = options.within_cents.value_or(kWithinCents),
+                                   .picture = options.picture,
+                                   .has_json = options.json});
+  if (options.within_cents) throw InputError("--within is for measured frequency responses (.uff); leave it out");
   const bank::Bank first = bank::read_bank(options.file), second = bank::read_bank(options.second);
   const exchange::Comparison found = exchange::compare(first, second, options.compared_modes, options.second);
-  if (!options.picture.empty()) {
-    if (base::find_extension(options.picture) != ".svg")
-      throw InputError(fmt::format("--picture {}: the picture is SVG; give it a name that ends in .svg", options.picture));
+  if (!options.picture.empty())
     base::write_file(options.picture, exchange::format_picture(found, base::printable(options.file), base::printable(options.second)));
-  }
   fmt::print("{}", options.json ? exchange::format_json(found, first, second) : exchange::format_table(found, first, second));
 }
 
