@@ -217,6 +217,7 @@ void export_frfs(const bank::Bank& bank, const ExportWishes& wishes, const std::
   fmt::print(notes, "uff       {} functions of {} lines, {:g} to {:g} Hz; force at node {} along {}{}\n", set.frfs.size(),
              first.freq_hz.size(), first.freq_hz.front(), first.freq_hz.back(), first.reference_node,
              kAxes[static_cast<std::size_t>(first.reference_direction + 3)], bank.counts.rigid_modes == 6 ? "; with the rigid body" : "");
+  for (const auto& [node, x] : set.nodes_m) fmt::print(notes, "node {:<5}{:.5g}, {:.5g}, {:.5g} m\n", node, x[0], x[1], x[2]);
 }
 
 }  // namespace
@@ -262,7 +263,7 @@ void run_measured(const MeasuredWishes& wishes) {
   const std::string name = wishes.measured.string();
   const bank::Bank played = bank::calc_corrected(bank::read_bank(wishes.bank));
   const FrfSet measured = parse_frfs(base::read_file(wishes.measured, "universal file", kMaxResultBytes), name);
-  const MeasuredComparison found = compare_measured(played, measured, wishes.modes, wishes.within_cents, name);
+  const MeasuredComparison found = compare_measured(played, measured, wishes.modes, wishes.within_cents, !wishes.picture.empty(), name);
   if (!wishes.picture.empty())
     base::write_file(wishes.picture, format_picture(found, played, base::printable(wishes.bank.string()), base::printable(name)));
   fmt::print("{}", wishes.has_json ? format_json(found, played) : base::printable_lines(format_table(found, played)));

@@ -12,7 +12,7 @@ namespace carillon::exchange {
 namespace {
 
 constexpr int kFrfType = 4, kComplexSingle = 5, kComplexDouble = 6, kEven = 1, kFrequency = 18, kForce = 13;
-constexpr double kStandardGravity = 9.80665;
+constexpr double kStandardGravity = 9.80665, kLargest = 1e30, kHighestHz = 1e9;
 constexpr std::size_t kMaxFrfs = 100'000, kUffLine = 80;
 /// Least bytes of a line of a function: two numbers of 13 columns, or of 4 bytes.
 constexpr std::size_t kLeastText = 26, kLeastBinary = 8;
@@ -112,12 +112,13 @@ class FrfReader {
     else
       read_text(frf, form, spacing);
     for (std::complex<double>& value : frf.value) {
-      if (!std::isfinite(value.real()) || !std::isfinite(value.imag())) lines_.fail("a value that is not finite; write the function again");
+      if (!(std::abs(value) < kLargest)) lines_.fail("a value of {:g}; write the function again", std::abs(value));
       if (is_in_g) value *= kStandardGravity;
     }
     for (std::size_t i = 0; i < count; ++i)
-      if (!(frf.freq_hz[i] >= 0.0) || !std::isfinite(frf.freq_hz[i]) || (i > 0 && !(frf.freq_hz[i] > frf.freq_hz[i - 1])))
-        lines_.fail("frequency {} of the function is {:g} Hz; they have to be ascending: write the function again", i + 1, frf.freq_hz[i]);
+      if (!(frf.freq_hz[i] >= 0.0 && frf.freq_hz[i] < kHighestHz) || (i > 0 && !(frf.freq_hz[i] > frf.freq_hz[i - 1])))
+        lines_.fail("frequency {} of the function is {:g} Hz; they have to be ascending, from 0 to 1e9: write the function again", i + 1,
+                    frf.freq_hz[i]);
     set_.frfs.push_back(std::move(frf));
     read_end();
   }

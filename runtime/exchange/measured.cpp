@@ -162,7 +162,6 @@ std::optional<MeasuredMode> fit_mode(const Receptances& all, std::size_t begin, 
   if (!(det > 1e-24 * gram[0] * gram[2])) return std::nullopt;
   const double shift = (gram[2] * right[0] - gram[1] * right[1]) / det, loss = (gram[0] * right[1] - gram[1] * right[0]) / det;
   const double explained = shift * right[0] + loss * right[1];
-  // Here columns[2] = a x equals a shift + i a omega loss - line: the signs of the equation of motion.
   if (!(explained >= kExplained * total) || !(shift > x.front() && shift < x.back()) || !(loss > 0.0)) return std::nullopt;
   MeasuredMode mode{.freq_hz = scale * std::sqrt(1.0 + shift) / (2.0 * std::numbers::pi), .decay_per_s = 0.5 * scale * loss, .residue = {}};
   for (const std::vector<Complex>& value : all.value) {
@@ -183,8 +182,8 @@ std::vector<MeasuredMode> find_modes(const Receptances& all, const std::vector<d
     std::size_t half = 0;  // lines to half the power, on the wider side
     while (half < kMostHalf && (is_high(peak.line - half) || is_high(peak.line + half))) ++half;  // wraps below 0: not high
     half = std::clamp(2 * half, kLeastHalf, kMostHalf);
-    std::size_t begin = std::max(peak.left, peak.line - std::min(peak.line, half)),
-                end = std::min(peak.right, std::min(power.size() - 1, peak.line + half)) + 1;
+    const std::size_t begin = std::max(peak.left, peak.line - std::min(peak.line, half)),
+                      end = std::min(peak.right, std::min(power.size() - 1, peak.line + half)) + 1;
     if (end - begin < kLeastHalf + 1) continue;
     if (auto mode = fit_mode(all, begin, end, peak.line)) modes.push_back(std::move(*mode));
   }
@@ -285,7 +284,7 @@ std::vector<MeasuredMode> find_modes(const FrfSet& measured, const std::string& 
   return find_modes(all, calc_power(all));
 }
 
-MeasuredComparison compare_measured(const bank::Bank& played, const FrfSet& measured, std::size_t most, double within_cents,
+MeasuredComparison compare_measured(const bank::Bank& played, const FrfSet& measured, std::size_t most, double within_cents, bool draws,
                                     const std::string& name) {
   const Receptances all = calc_receptances(measured, name);
   const std::vector<double> power = calc_power(all);
@@ -308,7 +307,7 @@ MeasuredComparison compare_measured(const bank::Bank& played, const FrfSet& meas
     throw InputError(fmt::format("{}: the bank has no mode within the measured band, {:.4g} to {:.4g} Hz", name, result.freq_hz.front(),
                                  result.freq_hz.back()));
   calc_pairs(played, placed, modes, within_cents, result);
-  if (!placed.empty()) calc_bank_level(played, placed, result);
+  if (draws && !placed.empty()) calc_bank_level(played, placed, result);
   return result;
 }
 
@@ -375,11 +374,11 @@ std::string format_picture(const MeasuredComparison& comparison, const bank::Ban
     text += fmt::format(
         "<path d=\"M{0:.0f} {1:.1f}H{2:.0f}\" stroke=\"#ddd\"/><text x=\"{3:.0f}\" y=\"{4:.1f}\" text-anchor=\"end\">{5:.0f}</text>\n",
         kLeft, y(db), kWidth - 20.0, kLeft - 6.0, y(db) + 4.0, db);
-  for (int k = 0; k <= 5; ++k) {
-    const double hz = low_hz + (high_hz - low_hz) * k / 5.0;
-    text += fmt::format("<text x=\"{:.1f}\" y=\"{:.0f}\" text-anchor=\"middle\">{:.0f}</text>\n", x(hz), kHeight - 22.0, hz);
-  }
-  const auto draw = [&](const std::vector<double>& hz, const std::vector<double>& db, const char* colour) {
+  const double decade = std::pow(10.0, std::floor(std::log10(0.2 * (high_hz - low_hz)))), digit = 0.2 * (high_hz - low_hz) / decade;
+  const double step = decade * (digit < 1.5 ? 1.0 : digit < 3.5 ? 2.0 : digit < 7.5 ? 5.0 : 10.0);
+  for (double hz = step * std::ceil(low_hz / step); hz <= high_hz; hz += step)
+    text += fmt::format("<text x=\"{:.1f}\" y=\"{:.0f}\" text-anchor=\"middle\">{:.5g}</text>\n", x(hz), kHeight - 22.0, hz);
+  const auto draw = [&](const std::vector<double>& hz, const std::vector<double>& db, const char* stroke) {
     std::vector<double> highest(kColumns, -1e300);
     for (std::size_t i = 0; i < hz.size(); ++i) {
       const auto column = std::min(static_cast<std::size_t>(kColumns * (hz[i] - low_hz) / (high_hz - low_hz)), kColumns - 1);
@@ -390,10 +389,10 @@ std::string format_picture(const MeasuredComparison& comparison, const bank::Ban
       if (highest[c] > -1e300)
         path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : "L", kLeft + plot_width * (static_cast<double>(c) + 0.5) / kColumns,
                             y(highest[c]));
-    text += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\"/>\n", path, colour);
+    text += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\"/>\n", path, stroke);
   };
+  if (!comparison.bank_hz.empty()) draw(comparison.bank_hz, comparison.bank_db, "#c03020\" stroke-width=\"2.5");
   draw(comparison.freq_hz, comparison.level_db, "#000");
-  if (!comparison.bank_hz.empty()) draw(comparison.bank_hz, comparison.bank_db, "#c03020");
   for (const MeasuredPair& pair : comparison.pairs)
     text += fmt::format("<path class=\"pair\" d=\"M{0:.1f} {1:.0f}V{2:.0f}\" stroke=\"#2060c0\"/>\n",
                         x(comparison.peaks[pair.peak].freq_hz), kTop - 12.0, kTop - 2.0);

@@ -36,7 +36,7 @@ struct MeasuredComparison {
   std::size_t frf_count = 0;
   std::vector<double> freq_hz;           // (L) of the measurement, above 0
   std::vector<double> level_db;          // (L) rms accelerance over the functions, re 1 m/(N s^2)
-  std::vector<double> bank_hz, bank_db;  // the same of the bank, at those and at its modes; empty: points unknown
+  std::vector<double> bank_hz, bank_db;  // the same of the bank, at those and at its modes; empty: not asked for, or points unknown
   std::string unknown;                   // why they are; empty: known
   std::vector<MeasuredMode> peaks;
   std::vector<MeasuredPair> pairs;  // ascending in `mode`
@@ -44,8 +44,9 @@ struct MeasuredComparison {
 };
 
 /// Compares the `most` lowest modes of the bank within the measured band, as played (corrected, in air), with the peaks. Pairs have the
-/// least sum of |cents| / `within_cents` + 1 - MAC, and lie within that distance. Throws InputError "name: ...".
-MeasuredComparison compare_measured(const bank::Bank& played, const FrfSet& measured, std::size_t most, double within_cents,
+/// least sum of |cents| / `within_cents` + 1 - MAC, and lie within that distance. `draws`: with bank_hz, bank_db. Throws InputError "name:
+/// ...".
+MeasuredComparison compare_measured(const bank::Bank& played, const FrfSet& measured, std::size_t most, double within_cents, bool draws,
                                     const std::string& name);
 
 std::string format_table(const MeasuredComparison& comparison, const bank::Bank& played);

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""CPU seconds of `carillon-mesh --look` on CAE meshes of a million nodes (.inp, Nastran, UNV), and of meshio on the same .inp file.
+"""CPU seconds of `carillon-mesh --look` on CAE meshes of a million nodes (.inp, Nastran, UNV), of meshio on the same .inp file, and of
+`carillon-bank import` on one and two modes of the Nastran mesh (.pch).
 
 usage: readers.py BIN_DIR [NODES]
 """
@@ -52,6 +53,17 @@ def write_files(folder, points, tets):
         file.write("    -1\n")
 
 
+def write_modes(path, points, count):
+    """Eigenvectors of a punch file."""
+    with open(path, "w") as file:
+        for mode in range(1, count + 1):
+            file.write("$TITLE   =\n$SUBTITLE=\n$LABEL   =\n$EIGENVECTOR\n$REAL OUTPUT\n$SUBCASE ID =           1\n")
+            file.write("$EIGENVALUE = %14.7E  MODE = %5d\n" % (1e8 * mode, mode))
+            shape = numpy.cos(mode * numpy.pi * points / points.max(axis=0))
+            line = "%10d       G%18.6E%18.6E%18.6E%8d\n-CONT-            " + "%18.6E" * 3 % (0, 0, 0) + "%8d\n"
+            file.writelines(line % (i, *x, 2 * i, 2 * i + 1) for i, x in enumerate(shape.tolist(), 1))
+
+
 def measure(command):
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(list(map(str, command)), check=True, stdout=subprocess.DEVNULL)
@@ -60,7 +72,8 @@ def measure(command):
 
 
 def main():
-    look = pathlib.Path(sys.argv[1]).resolve() / "carillon-mesh"
+    programs = pathlib.Path(sys.argv[1]).resolve()
+    look = programs / "carillon-mesh"
     points, tets = make_bar(int(sys.argv[2]) if len(sys.argv) > 2 else 1_000_000)
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -71,6 +84,10 @@ def main():
         print(
             f"meshio {measure([sys.executable, '-c', 'import sys, meshio; meshio.read(sys.argv[1])', folder / 'bar.inp']):.2f} CPU s (.inp)"
         )
+        for modes in 1, 2:
+            write_modes(folder / "bar.pch", points, modes)
+            words = ["import", folder / "bar.pch", "--mesh", folder / "bar.bdf", "--material", "steel", "-o", folder / "bar.hdf"]
+            print(f".pch  {measure([programs / 'carillon-bank', *words]):.2f} CPU s with the mesh and the bank, modes: {modes}")
 
 
 main()
