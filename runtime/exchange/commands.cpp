@@ -16,6 +16,7 @@
 #include "runtime/bank/write.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/includes.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
 #include "runtime/exchange/faust.hpp"

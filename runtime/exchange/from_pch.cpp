@@ -2,9 +2,15 @@
 //   -CONT-, in fields of 18 columns. Columns 73 to 80 number the lines and are not read.
 // Source: MSC Nastran quick reference guide (DISPLACEMENT, PUNCH; GRID, GRDSET, CTETRA); Altair OptiStruct reference, "Punch File".
 // Limitation: tetrahedra; real modes of one subcase; basic coordinate system.
-#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <utility>
 
 #include "runtime/base/bdf_cards.hpp"
+#include "runtime/base/failure.hpp"
+#include "runtime/base/fields.hpp"
+#include "runtime/base/printable.hpp"
 #include "runtime/exchange/results_lines.hpp"
 #include "runtime/exchange/solved_model.hpp"
 

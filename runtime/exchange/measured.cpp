@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "runtime/base/error.hpp"
@@ -243,7 +244,7 @@ void calc_pairs(const bank::Bank& played, const std::vector<PlacedFrf>& placed, 
         if (own.size() > 1) pair.mac = std::norm(both) / (own_power * power);
       }
       const double away = std::abs(pair.cents) / within_cents;
-      cost[i * columns + j] = away <= 1.0 ? away + 1.0 - pair.mac.value_or(1.0) : kForbidden;
+      cost[i * columns + j] = away <= 1.0 ? away * away + 1.0 - pair.mac.value_or(1.0) : kForbidden;
     }
   }
   std::vector<char> has_peak(peaks, 0);

@@ -205,9 +205,7 @@ def check_comparison(folder):
                 1 - pair["mac"],
             ]
             worst = numpy.maximum(worst, differ)
-        print(
-            f"{case}: {len(seen_modes)} modes within {worst[0]:.1e} cents, decay {worst[1]:.1e}, level {worst[2]:.1e} dB, 1 - MAC {worst[3]:.1e}"
-        )
+        print(f"{case}: {len(seen_modes)} modes; cents, decay, dB, 1 - MAC within " + " ".join(f"{x:.1e}" for x in worst))
         assert (worst < ([0.05, 0.05, 0.3, 0.02] if noise else [2e-3, 1e-3, 0.05, 0.01])).all(), (case, worst)
     picture = (folder / "h.svg").read_text()
     assert picture.startswith("<svg") and picture.count('class="pair"') == len(found["pairs"])
