@@ -26,8 +26,9 @@ carillon_component(THIN_WALLS "extruded meshes of thin walls" precompute/mesher/
 carillon_component(ANALYTIC "bodies with known modes" precompute/analytic precompute/run/known_body.cpp)
 carillon_component(PAGE "the web page of carillon explore and its sound engine" jobs/front/explore runtime/bindings/web)
 carillon_component(EXCHANGE "banks as GLB, Faust, SOFA and samples" runtime/exchange/commands.cpp runtime/exchange/from_glb.cpp
+  runtime/exchange/gltf_scene.cpp runtime/exchange/scale_rule.cpp runtime/exchange/silent.cpp runtime/render/gltf_input.cpp
   runtime/exchange/to_faust.cpp runtime/exchange/to_glb.cpp runtime/exchange/to_sofa.cpp runtime/exchange/struck_point.cpp
-  runtime/exchange/faust.hpp runtime/exchange/glb.hpp runtime/exchange/sofa.hpp runtime/exchange/struck_point.hpp runtime/render/samples)
+  runtime/exchange/faust.hpp runtime/exchange/glb.hpp runtime/exchange/gltf_scene.hpp runtime/exchange/scale_rule.hpp runtime/exchange/silent.hpp runtime/exchange/sofa.hpp runtime/exchange/struck_point.hpp runtime/render/samples)
 carillon_component(SLURM "jobs in Slurm" jobs/queue/slurm jobs/cli/slurm.cpp)
 carillon_component(HEADS "listeners with a head" runtime/acoustics/head runtime/synth/head_ears.cpp)
 carillon_component(STUDIES "advice, scaling studies and bodies matched to recordings: carillon-study, carillon-tune" jobs/study jobs/tune)

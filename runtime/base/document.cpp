@@ -22,6 +22,7 @@ std::string join(const std::vector<std::string>& words) {
 
 Document::Document(std::shared_ptr<DocumentData> data) : data_(std::move(data)) {}
 Object Document::root() const { return Object(data_, &data_->root, ""); }
+void Document::show_paths() { data_->has_paths = true; }
 const std::filesystem::path& Document::file() const { return data_->file; }
 std::size_t Document::count_scanned_bytes() const { return data_->scanned_bytes; }
 
@@ -52,7 +53,8 @@ std::string full_name(const std::string& name, std::string_view key) {
 void Object::fail(std::string_view key, const std::string& message) const {
   const Value* member = key.empty() ? nullptr : value_->find(key);
   if (member != nullptr) data_->fail(member->key_offset, fmt::format("\"{}\": {}", full_name(name_, key), message));
-  data_->fail(value_->offset, key.empty() ? message : fmt::format("\"{}\": {}", full_name(name_, key), message));
+  const std::string name = key.empty() ? (data_->has_paths ? name_ : "") : full_name(name_, key);
+  data_->fail(value_->offset, name.empty() ? message : fmt::format("\"{}\": {}", name, message));
 }
 
 namespace {

@@ -133,6 +133,8 @@ struct Entry {
 class Document {
  public:
   Object root() const;
+  /// From now on messages about an object as a whole begin with its path, as those about a key do: for files without lines.
+  void show_paths();
   const std::filesystem::path& file() const;
   /// Bytes scanned so far for line numbers; at most the length of the text.
   std::size_t count_scanned_bytes() const;

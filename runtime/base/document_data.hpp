@@ -41,6 +41,7 @@ std::string kind_of(const Value& value);
 struct DocumentData {
   std::filesystem::path file;
   int first_line = 1;
+  bool has_paths = false;  // messages about an object begin with its path
   std::string text;
   Value root;
   mutable std::vector<std::size_t> line_ends;  // built on first use

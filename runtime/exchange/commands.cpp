@@ -22,7 +22,9 @@
 #include "runtime/exchange/faust.hpp"
 #include "runtime/exchange/frf.hpp"
 #include "runtime/exchange/glb.hpp"
+#include "runtime/exchange/gltf_scene.hpp"
 #include "runtime/exchange/measured.hpp"
+#include "runtime/exchange/silent.hpp"
 #include "runtime/exchange/sofa.hpp"
 #include "runtime/exchange/solved_model.hpp"
 #include "runtime/material/table.hpp"
@@ -44,7 +46,8 @@ bank::Bank import_results(const ImportWishes& wishes, const material::Material* 
     throw InputError(
         fmt::format("{}: modes of another solver name no density and no damping; add --material NAME (`carillon materials` lists them)",
                     wishes.file.string()));
-  if (wishes.model || wishes.is_plain) throw InputError("--model and --plain are for glTF files; leave them out");
+  if (wishes.model || wishes.is_plain || wishes.scales_frequencies)
+    throw InputError("--model, --plain and --scale-frequencies are for glTF files; leave them out");
   const ResultsReading reading{.material = material,
                                .units = wishes.unit == "mm-t-s" ? ModelUnits::kMillimetre : ModelUnits::kMetre,
                                .are_units_given = !wishes.unit.empty()};
@@ -60,10 +63,14 @@ bank::Bank import_results(const ImportWishes& wishes, const material::Material* 
   return make_bank(ending == ".frd" ? parse_frd(bytes, name) : parse_unv(bytes, name), name, reading, &notes);
 }
 
+GlbReading make_reading(const ImportWishes& wishes, const material::Material* material) {
+  return {.model = wishes.model, .ignores_extras = wishes.is_plain, .material = material, .scales_frequencies = wishes.scales_frequencies};
+}
+
 bank::Bank import_glb(const ImportWishes& wishes, const material::Material* material, std::vector<std::string>& notes) {
   if (!wishes.unit.empty()) throw InputError("--unit is for modes of other solvers; glTF is in metres");
   if (!wishes.mesh.empty()) throw InputError("--mesh is for Nastran's .pch files; leave it out");
-  const GlbReading reading{.model = wishes.model, .ignores_extras = wishes.is_plain, .material = material};
+  const GlbReading reading = make_reading(wishes, material);
   return parse_glb(base::read_file(wishes.file, "GLB or glTF file", kMaxGlbBytes), wishes.file.string(), reading, &notes);
 }
 
@@ -221,6 +228,66 @@ void export_frfs(const bank::Bank& bank, const ExportWishes& wishes, const std::
   for (const auto& [node, x] : set.nodes_m) fmt::print(notes, "node {:<5}{:.5g}, {:.5g}, {:.5g} m\n", node, x[0], x[1], x[2]);
 }
 
+/// The folder: new, or replaced if it holds only a scene of an earlier call.
+fs::path find_scene_folder(const fs::path& out) {
+  fs::path place = fs::absolute(out).lexically_normal();
+  if (place.filename().empty()) place = place.parent_path();
+  std::error_code error;
+  if (!fs::exists(place, error)) return place;
+  bool is_ours = fs::is_directory(place, error);
+  if (is_ours)
+    for (const fs::directory_entry& entry : fs::directory_iterator(place, error))
+      is_ours = is_ours && (entry.path().filename() == kSceneFile || base::find_extension(entry.path()) == ".hdf");
+  if (!is_ours || error)
+    throw InputError(
+        fmt::format("{}: contains other files, and the folder of a scene is replaced as a whole; give another one with -o", out.string()));
+  return place;
+}
+
+void import_scene(const ImportWishes& wishes, const material::Material* material) {
+  if (!wishes.unit.empty()) throw InputError("--unit is for modes of other solvers; glTF is in metres");
+  if (wishes.model) throw InputError("--model chooses one model for a bank, and -o names a folder for the whole scene; leave one out");
+  base::WholeFolder folder(find_scene_folder(wishes.out));
+  const GltfScene made = write_gltf_scene(wishes.file, make_reading(wishes, material), folder.path());
+  for (const std::string& warning : made.warnings)
+    fmt::print(stderr, "carillon-bank: warning: {}: {}\n", base::printable(wishes.file.string()), warning);
+  folder.commit();
+  for (const std::string& reading : made.readings) fmt::print("{}\n", reading);
+  fmt::print("scene     {} bodies, {} banks: {}\n", made.bodies, made.banks, base::printable((wishes.out / kSceneFile).string()));
+}
+
+/// Numbers of "box:1,2,3" after its name; empty: another shape.
+std::vector<double> read_sizes(const std::string& word, std::string_view shape, std::size_t count) {
+  if (!word.starts_with(shape) || word.size() <= shape.size() || word[shape.size()] != ':') return {};
+  std::vector<double> sizes(count);
+  const char* at = word.data() + shape.size() + 1;
+  const char* const end = word.data() + word.size();
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto read = std::from_chars(at, end, sizes[k]);
+    const bool is_last = k + 1 == count;
+    if (read.ec != std::errc() || !(sizes[k] > 0.0 && std::isfinite(sizes[k])) ||
+        (is_last ? read.ptr != end : read.ptr == end || *read.ptr != ','))
+      throw InputError(fmt::format("{}: give {} lengths in metres above 0 after the colon, with commas between them", word, count));
+    at = read.ptr + 1;
+  }
+  return sizes;
+}
+
+/// Cylinders and capsules along z.
+Surface read_silent_surface(const std::string& word) {
+  const auto raise = [](Surface surface) {
+    for (Vec3& v : surface.vertices_m) v = {v[0], -v[2], v[1]};
+    return surface;
+  };
+  if (const auto s = read_sizes(word, "box", 3); !s.empty()) return make_box({s[0], s[1], s[2]});
+  if (const auto s = read_sizes(word, "sphere", 1); !s.empty()) return make_sphere(s[0]);
+  if (const auto s = read_sizes(word, "cylinder", 2); !s.empty()) return raise(make_cylinder(s[0], s[1], s[1]));
+  if (const auto s = read_sizes(word, "capsule", 2); !s.empty()) return raise(make_capsule(s[0], s[1], s[1]));
+  if (base::find_extension(word) == ".obj") return parse_obj_surface(base::read_file(word, "surface", kMaxGlbBytes), word);
+  const bank::Bank bank = bank::read_bank(word);
+  return {bank.vertices_m, bank.triangles};
+}
+
 }  // namespace
 
 void run_export(const ExportWishes& wishes) {
@@ -274,6 +341,7 @@ void run_import(const ImportWishes& wishes) {
   for (const fs::path& in : {wishes.file, wishes.mesh}) check_other(in, wishes.out);
   const material::Material* const material =
       wishes.material.empty() ? nullptr : &material::MaterialTable::get().require("--material", wishes.material).material;
+  if (wishes.is_scene) return import_scene(wishes, material);
   std::vector<std::string> notes;
   const bank::Bank bank = has_results(wishes.file) ? import_results(wishes, material, notes) : import_glb(wishes, material, notes);
   for (const std::string& note : notes) fmt::print(stderr, "carillon-bank: note: {}: {}\n", base::printable(wishes.file.string()), note);
@@ -283,6 +351,36 @@ void run_import(const ImportWishes& wishes) {
   } else {
     bank::write_bank(bank, wishes.out);
     fmt::print("bank      {} modes, {} vertices: {}\n", bank.mode_count(), bank.vertex_count(), base::printable(wishes.out.string()));
+  }
+}
+
+void run_silent(const SilentWishes& wishes) {
+  if (!base::is_standard_output(wishes.out)) check_other(wishes.body, wishes.out);
+  SilentBody body{.surface = read_silent_surface(wishes.body), .mass_kg = wishes.mass_kg, .origin = wishes.body};
+  if (!wishes.material.empty()) {
+    const material::Material& material = material::MaterialTable::get().require("--material", wishes.material).material;
+    body.density_kg_m3 = material.density_kg_m3;
+    body.young_modulus_pa = material.young_modulus_pa;
+    body.poisson_ratio = material.poisson_ratio;
+  } else if (!wishes.density_kg_m3 && !wishes.mass_kg) {
+    throw InputError("give --material NAME, --density or --mass: bodies that collide need a mass");
+  }
+  body.density_kg_m3 = wishes.density_kg_m3.value_or(body.density_kg_m3);
+  body.young_modulus_pa = wishes.young_modulus_pa.value_or(body.young_modulus_pa);
+  body.poisson_ratio = wishes.poisson_ratio.value_or(body.poisson_ratio);
+  bank::Bank bank;
+  try {
+    bank = make_silent_bank(body);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", wishes.body, error.what()));
+  }
+  if (base::is_standard_output(wishes.out)) {
+    base::check_standard_output("bank");
+    base::write_standard_output(bank::make_bank_bytes(bank));
+  } else {
+    bank::write_bank(bank, wishes.out);
+    fmt::print("bank      no modes, {} vertices, {:.6g} kg: {}\n", bank.vertex_count(), bank.rigid.mass_kg,
+               base::printable(wishes.out.string()));
   }
 }
 

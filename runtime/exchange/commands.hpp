@@ -35,6 +35,8 @@ struct ImportWishes {
   std::optional<std::size_t> model;
   std::string material;
   bool is_plain = false;
+  std::optional<bool> scales_frequencies;  // of scaled nodes
+  bool is_scene = false;                   // `out` is a folder for the whole scene
 };
 
 struct MeasuredWishes {
@@ -48,7 +50,17 @@ struct MeasuredWishes {
 /// Compares a bank with the frequency responses of a universal file: table or JSON on standard output. Throws InputError.
 void run_measured(const MeasuredWishes& wishes);
 
-/// Imports a GLB file, or modes of another solver, as a bank. Throws InputError.
+/// Imports a GLB file, or modes of another solver, as a bank, or a glTF scene into a folder. Throws InputError.
 void run_import(const ImportWishes& wishes);
+
+struct SilentWishes {
+  std::string body;  // "box:X,Y,Z", "sphere:R", "cylinder:H,R", "capsule:H,R", an OBJ file or a bank
+  std::filesystem::path out;
+  std::string material;
+  std::optional<double> mass_kg, density_kg_m3, young_modulus_pa, poisson_ratio;
+};
+
+/// Writes a bank without modes. Throws InputError.
+void run_silent(const SilentWishes& wishes);
 
 }  // namespace carillon::exchange

@@ -2,8 +2,7 @@
 //   (bank::assemble_bank); values present in both must agree. Other programs' files: lambda = (2 pi f)^2 + d^2, shapes rounded to 16 bits,
 //   mass properties by the divergence theorem if the model has none.
 // Source: KHR_audio_rigid_bodies, draft of 2026 (K. Hiner).
-// Deviations: the node's scale applies to the body, and to modes and mass given for the unscaled body; its rotation and translation are
-//   ignored.
+// Deviations: the node's scale applies to the body, and to modes and mass given for the unscaled body (scale_rule.hpp).
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -31,6 +30,7 @@
 #include "runtime/exchange/glb.hpp"
 #include "runtime/exchange/gltf/file.hpp"
 #include "runtime/exchange/gltf/nodes.hpp"
+#include "runtime/exchange/scale_rule.hpp"
 #include "runtime/exchange/solid.hpp"
 
 namespace carillon::exchange {
@@ -38,12 +38,13 @@ namespace {
 
 using gltf::Component;
 
-constexpr std::size_t kMaxFields = 1000, kMaxListed = 10'000'000, kMaxNodes = 10'000'000;
-constexpr double kFreqTolerance = 1e-6;    // relative error of a frequency in float, through a sum of squares
-constexpr double kStepTolerance = 0.02;    // steps of a shape: rounding of an integer stored as float
-constexpr double kDecayTolerance = 1e-5;   // relative error of a decay in float against its law
-constexpr double kScaleTolerance = 1e-4;   // relative difference between the axes of a node
-constexpr double kInertiaTolerance = 0.3;  // relative difference for uneven bodies and coarse surfaces
+constexpr std::size_t kMaxFields = 1000, kMaxListed = 10'000'000;
+constexpr double kFreqTolerance = 1e-6;     // relative error of a frequency in float, through a sum of squares
+constexpr double kStepTolerance = 0.02;     // steps of a shape: rounding of an integer stored as float
+constexpr double kDecayTolerance = 1e-5;    // relative error of a decay in float against its law
+constexpr double kScaleTolerance = 1e-4;    // relative difference between the axes of a node
+constexpr double kInertiaTolerance = 0.05;  // largest relative difference about any axis
+constexpr double kDensityTolerance = 0.1;   // of mass over volume from the material, in a warning
 constexpr const char* kChanged = "was changed since carillon-bank wrote it; --plain reads the extension alone";
 
 /// Model in the extension.
@@ -54,20 +55,52 @@ struct Model {
   gltf::Numbers shapes;                                // (M, P) rows of three
 };
 
+/// The tensor of principal moments with their axes: keys of massProperties and of motion.
+std::array<double, 9> read_inertia(base::Object& owner) {
+  const auto diagonal = owner.numbers<3>("inertiaDiagonal");
+  const auto q = owner.numbers_or<4>("inertiaOrientation", {0, 0, 0, 1});
+  const Eigen::Quaterniond turn(q[3], q[0], q[1], q[2]);
+  if (!(turn.norm() > 0.0)) owner.fail("inertiaOrientation", "is not a rotation; it must be a unit quaternion");
+  const Eigen::Matrix3d axes = turn.normalized().toRotationMatrix();
+  std::array<double, 9> inertia{};
+  Eigen::Map<Eigen::Matrix3d>(inertia.data()) =
+      axes * Eigen::Vector3d(diagonal[0], diagonal[1], diagonal[2]).asDiagonal() * axes.transpose();
+  return inertia;
+}
+
 class Reader {
  public:
-  Reader(std::string_view bytes, const std::string& name, const GlbReading& reading)
-      : file_(gltf::parse(bytes, name)), reading_(&reading), root_(file_.root()) {}
+  Reader(gltf::File& file, const GlbReading& reading)
+      : file_(file), reading_(&reading), root_(file_.root()), extension_(find_extension()) {}
 
-  const std::vector<std::string>& get_notes() const { return notes_; }
-
-  bank::Bank read() {
-    base::Object extension = find_extension();
-    base::Object model = choose_model(extension);
+  ModelBank read(std::size_t number, const Placement& placement) {
+    std::vector<base::Object> models = extension_.objects("modalModels");
+    base::Object& model = models[number];
     read_model(model);
     std::optional<base::Object> extras = model.object_if("extras");
     std::optional<base::Object> own = extras && !reading_->ignores_extras ? extras->object_if("carillon") : std::nullopt;
-    return own ? assemble(*own) : make(extension, model);
+    ModelBank made;
+    if (own && is_as_solved(model, placement)) {
+      made.bank = assemble(*own);
+    } else {
+      if (own) warnings_.push_back("its node changes size or mass: read as a file of another program");
+      made.bank = make(model, placement);
+    }
+    made.reading = reading_of_scale_;
+    made.warnings = std::move(warnings_);
+    return made;
+  }
+
+  std::size_t choose_model() {
+    std::vector<base::Object> models = extension_.objects("modalModels");
+    if (models.empty()) extension_.fail("modalModels", "this file has no modal model; export it with one");
+    if (!reading_->model && models.size() > 1)
+      extension_.fail("modalModels", fmt::format("there are {} models; choose one with --model, from 0, or import the scene into a folder",
+                                                 models.size()));
+    const std::size_t number = reading_->model.value_or(0);
+    if (number >= models.size())
+      extension_.fail("modalModels", fmt::format("there is no model {}; there are {}, numbered from 0", number, models.size()));
+    return number;
   }
 
  private:
@@ -78,15 +111,11 @@ class Reader {
     return extensions->object(kExtension);
   }
 
-  base::Object choose_model(base::Object& extension) {
-    std::vector<base::Object> models = extension.objects("modalModels");
-    if (models.empty()) extension.fail("modalModels", "this file has no modal model; export it with one");
-    if (!reading_->model && models.size() > 1)
-      extension.fail("modalModels", fmt::format("there are {} models; choose one with --model, from 0", models.size()));
-    number_ = reading_->model.value_or(0);
-    if (number_ >= models.size())
-      extension.fail("modalModels", fmt::format("there is no model {}; there are {}, numbered from 0", number_, models.size()));
-    return models[number_];
+  /// True for a node that leaves the model's size and mass as they are.
+  static bool is_as_solved(base::Object& model, const Placement& placement) {
+    if (std::abs(placement.scale - 1.0) > kScaleTolerance) return false;
+    std::optional<base::Object> own = model.object_if("massProperties");
+    return !placement.mass_kg || (own && std::abs(*placement.mass_kg - own->number("mass", base::kPositive)) <= 1e-9 * *placement.mass_kg);
   }
 
   std::vector<double> read_scalars(base::Object& model, const char* key) {
@@ -277,46 +306,20 @@ class Reader {
 
   // ---- files of other programs ----
 
-  /// Removes points without triangles.
+  /// Joins points at one place, and removes those without triangles.
   void drop_unused_points() {
+    std::map<Vec3, std::int32_t> first;
+    for (std::array<std::int32_t, 3>& triangle : model_.triangles)
+      for (std::int32_t& v : triangle) v = first.try_emplace(model_.positions[v], v).first->second;
     base::UsedPoints used = base::find_used_points(model_.triangles, model_.positions.size());
     used_ = std::move(used.points);
     for (auto& triangle : model_.triangles)
       for (std::int32_t& v : triangle) v = used.number[v];
     if (const std::size_t dropped = used.number.size() - used_.size(); dropped > 0)
-      notes_.push_back(fmt::format("{} of its points belong to no triangle and were dropped", dropped));
+      warnings_.push_back(fmt::format("{} of its points belong to no triangle, or repeat another one, and were dropped", dropped));
   }
 
-  /// Scale of the first node with the model; 1 if there is none.
-  double find_scale() {
-    std::vector<base::Object> nodes = root_.objects("nodes");
-    std::vector<std::size_t> parent(nodes.size(), nodes.size());
-    std::optional<std::size_t> found;
-    for (std::size_t n = 0; n < nodes.size(); ++n) {
-      if (nodes[n].has("children"))
-        for (const double child : nodes[n].number_list("children", kMaxNodes))
-          if (child >= 0.0 && child < static_cast<double>(nodes.size())) parent[child] = n;
-      std::optional<base::Object> extensions = nodes[n].object_if("extensions");
-      std::optional<base::Object> own = extensions ? extensions->object_if(kExtension) : std::nullopt;
-      if (found || !own) continue;
-      if (own->integer_if("modalModel", 0, std::numeric_limits<std::int32_t>::max()) == static_cast<long long>(number_)) found = n;
-    }
-    gltf::Matrix matrix = gltf::kIdentity;
-    std::size_t steps = 0;
-    for (std::size_t n = found.value_or(nodes.size()); n < nodes.size(); n = parent[n]) {
-      if (++steps > nodes.size()) nodes[n].fail("", fmt::format("node {} is its own ancestor; export it again", n));
-      matrix = gltf::multiply(gltf::read_transform(nodes[n]), matrix);
-    }
-    const std::array<double, 3> along{norm(Vec3{matrix[0], matrix[1], matrix[2]}), norm(Vec3{matrix[4], matrix[5], matrix[6]}),
-                                      norm(Vec3{matrix[8], matrix[9], matrix[10]})};
-    const auto [low, high] = std::minmax_element(along.begin(), along.end());
-    if (!(*low > 0.0 && *high - *low <= kScaleTolerance * *high))
-      nodes[*found].fail(
-          "", "its node is not scaled by the same along all axes, which changes the modes; apply the scale, and compute them again");
-    return *high;
-  }
-
-  bank::Material read_material(base::Object& extension, base::Object& model) {
+  bank::Material read_material(base::Object& model) {
     bank::Material material;
     if (reading_->material != nullptr) {
       material.young_modulus_pa = reading_->material->young_modulus_pa;
@@ -324,7 +327,7 @@ class Reader {
       material.density_kg_m3 = reading_->material->density_kg_m3;
       return material;
     }
-    std::vector<base::Object> materials = extension.objects("acousticMaterials");
+    std::vector<base::Object> materials = extension_.objects("acousticMaterials");
     const auto number = model.integer_if("material", 0, static_cast<long long>(materials.size()) - 1);
     if (!number) model.fail("material", "the model names no material, and contacts need its stiffness; give --material NAME");
     base::Object& own = materials[*number];
@@ -338,79 +341,53 @@ class Reader {
     return material;
   }
 
-  /// True if modes and mass belong to the unscaled body: its density is closer to the material's than that of the scaled body.
-  bool is_of_unscaled(base::Object& model, double scale, double volume_m3, double density_kg_m3) {
-    constexpr double kDensityTolerance = 0.1;  // relative error of the volume inside facets
+  /// Mass, centre and inertia of the body. `solid`: of its surface; `factor`: of lengths of the model that are not positions.
+  void read_mass(base::Object& model, const Placement& placement, const Solid& solid, double factor, bank::Bank& bank) {
+    bank::RigidBody& rigid = bank.rigid;
     std::optional<base::Object> own = model.object_if("massProperties");
-    if (std::abs(scale - 1.0) <= kScaleTolerance || !(volume_m3 > 0.0)) return false;
-    const auto note = [&](const std::string& text) {
-      notes_.push_back(fmt::format("its node scales the body by {:.6g}, {}", scale, text));
-    };
-    if (!own || reading_->material != nullptr) {
-      note("and it is unknown whether its modes are those of that size; they are used unchanged");
-      return false;
+    const double cube = std::pow(factor, 3);
+    const double model_kg = own ? cube * own->number("mass", base::kPositive) : bank.material.density_kg_m3 * solid.volume_m3;
+    rigid.volume_m3 = solid.volume_m3;
+    rigid.mass_kg = placement.mass_kg.value_or(model_kg);
+    rigid.centre_m = solid.centre_m;
+    if (placement.centre_m)
+      rigid.centre_m = placement.scale * *placement.centre_m;
+    else if (own)
+      rigid.centre_m = placement.scale * Vec3(own->numbers_or<3>("centerOfMass", {0, 0, 0}));
+    std::optional<std::array<double, 9>> inertia = placement.inertia_kg_m2;
+    if (!inertia && own && own->has("inertiaDiagonal")) {
+      inertia = read_inertia(*own);
+      for (double& x : *inertia) x *= cube * factor * factor * rigid.mass_kg / model_kg;
     }
-    const double mass = own->number("mass", base::kPositive);
-    const double scaled = mass / (scale * scale * scale * volume_m3), unscaled = mass / volume_m3;
-    const double scaled_off = std::abs(std::log(scaled / density_kg_m3)), unscaled_off = std::abs(std::log(unscaled / density_kg_m3));
-    const bool is_unscaled = unscaled_off < scaled_off;
-    const std::string taken = is_unscaled ? fmt::format(
-                                                "its modes and its mass are those of scale 1, and were scaled, too (frequencies by "
-                                                "{:.6g}, the mass by {:.6g})",
-                                                1.0 / scale, scale * scale * scale)
-                                          : "its modes and its mass are those of that size";
-    if (std::min(scaled_off, unscaled_off) > kDensityTolerance)
-      note(fmt::format(
-          "and its mass contradicts the {:.5g} kg/m^3 of its material: {:.5g} with the scale, {:.5g} without; by the nearer one {}",
-          density_kg_m3, scaled, unscaled, taken));
-    else if (is_unscaled)
-      note("and by the density of its material " + taken);
-    return is_unscaled;
+    settle_inertia(inertia, solid, bank);
+    const double density = rigid.mass_kg / solid.volume_m3;
+    if (std::abs(density / bank.material.density_kg_m3 - 1.0) > kDensityTolerance)
+      warnings_.push_back(fmt::format("its mass over its volume is {:.5g} kg/m^3, and the density of its material {:.5g}: the mass is kept",
+                                      density, bank.material.density_kg_m3));
+    bank.material.density_kg_m3 = density;
   }
 
-  /// Scales the body by `scale`.
-  static void scale_body(bank::Bank& bank, std::vector<double>& shapes, double scale) {
+  void settle_inertia(const std::optional<std::array<double, 9>>& given, const Solid& solid, bank::Bank& bank) {
+    bank::RigidBody& rigid = bank.rigid;
+    const auto [low, high] = bank::find_extent(bank.vertices_m);
+    bool is_inside = true;
+    for (std::size_t c = 0; c < 3; ++c) is_inside = is_inside && rigid.centre_m[c] > low[c] && rigid.centre_m[c] < high[c];
+    if (!is_inside) {
+      warnings_.push_back("its centre of mass lies outside its surface; that of the surface, filled evenly, is taken");
+      rigid.centre_m = solid.centre_m;
+    }
+    for (std::size_t i = 0; i < 9; ++i) rigid.inertia_kg_m2[i] = rigid.mass_kg / solid.volume_m3 * solid.inertia_m5[i];
+    if (given && !take_inertia(*given, rigid.inertia_kg_m2))
+      warnings_.push_back("its moments of inertia contradict its surface and its mass; those of the surface, filled evenly, are taken");
+  }
+
+  /// Modes of a body `factor` times as large.
+  static void scale_modes(bank::Bank& bank, double factor) {
     for (std::size_t m = 0; m < bank.mode_count(); ++m) {
-      bank.eigenvalue_rad2_s2[m] /= scale * scale;
-      bank.decay_per_s[m] = bank.damping.law == "mixed" ? bank.decay_per_s[m] / scale  // equal loss factor
+      bank.eigenvalue_rad2_s2[m] /= factor * factor;
+      bank.decay_per_s[m] = bank.damping.law == "mixed" ? bank.decay_per_s[m] / factor  // equal loss factor
                                                         : bank::calc_decay(bank.damping, bank.material, bank.eigenvalue_rad2_s2[m]);
     }
-    for (double& phi : shapes) phi /= scale * std::sqrt(scale);
-    for (Vec3& p : bank.vertices_m) p = scale * p;
-    bank.rigid.mass_kg *= std::pow(scale, 3);
-    bank.rigid.volume_m3 *= std::pow(scale, 3);
-    bank.rigid.centre_m = scale * bank.rigid.centre_m;
-    for (double& x : bank.rigid.inertia_kg_m2) x *= std::pow(scale, 5);
-  }
-
-  /// Mass properties of the model, or of its surface filled with the material.
-  void read_mass(base::Object& model, double scale, bank::Bank& bank) {
-    const Solid solid = calc_solid(bank.vertices_m, bank.triangles);
-    if (!(solid.volume_m3 > 0.0))
-      model.fail("indices", "its triangles enclose no volume or face inward; a bank needs a closed surface that faces outward");
-    bank.rigid.volume_m3 = solid.volume_m3;
-    bank.rigid.mass_kg = bank.material.density_kg_m3 * solid.volume_m3;
-    bank.rigid.centre_m = solid.centre_m;
-    std::optional<base::Object> own = model.object_if("massProperties");
-    std::optional<std::array<double, 3>> diagonal;
-    if (own) {
-      bank.rigid.mass_kg = own->number("mass", base::kPositive);
-      for (std::size_t c = 0; c < 3; ++c) bank.rigid.centre_m[c] = scale * own->numbers_or<3>("centerOfMass", {0, 0, 0})[c];
-      if (own->has("inertiaDiagonal")) diagonal = own->numbers<3>("inertiaDiagonal");
-    }
-    for (std::size_t i = 0; i < 9; ++i) bank.rigid.inertia_kg_m2[i] = bank.rigid.mass_kg / solid.volume_m3 * solid.inertia_m5[i];
-    if (diagonal && (*diagonal)[0] > 0.0 && (*diagonal)[1] > 0.0 && (*diagonal)[2] > 0.0) {
-      const auto q = own->numbers_or<4>("inertiaOrientation", {0, 0, 0, 1});
-      const Eigen::Matrix3d axes = Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized().toRotationMatrix();
-      const Eigen::Matrix3d inertia =
-          axes * Eigen::Vector3d((*diagonal)[0], (*diagonal)[1], (*diagonal)[2]).asDiagonal() * axes.transpose();
-      Eigen::Map<Eigen::Matrix3d> of_surface(bank.rigid.inertia_kg_m2.data());  // symmetric
-      if ((inertia - of_surface).norm() > kInertiaTolerance * of_surface.norm())
-        notes_.push_back("its moments of inertia contradict its surface and its mass; those of the surface, filled evenly, were taken");
-      else
-        of_surface = inertia;
-    }
-    bank.material.density_kg_m3 = bank.rigid.mass_kg / solid.volume_m3;
   }
 
   /// Rayleigh's law if the decays follow it, else "mixed".
@@ -428,22 +405,38 @@ class Reader {
     bank.decay_per_s = law;
   }
 
-  bank::Bank make(base::Object& extension, base::Object& model) {
+  bank::Bank make(base::Object& model, const Placement& placement) {
     drop_unused_points();
     const std::size_t modes = model_.freq_hz.size(), points = used_.size();
-    const double node_scale = find_scale();
     bank::Bank bank;
     for (const std::int32_t v : used_) bank.vertices_m.push_back(model_.positions[v]);
     bank.triangles = model_.triangles;
-    bank.material = read_material(extension, model);
-    const bool is_of_unscaled_body =
-        is_of_unscaled(model, node_scale, calc_solid(bank.vertices_m, bank.triangles).volume_m3, bank.material.density_kg_m3);
-    const double scale = is_of_unscaled_body ? 1.0 : node_scale;
-    for (Vec3& p : bank.vertices_m) p = scale * p;
+    bank.material = read_material(model);
+    const double stored_m3 = calc_solid(bank.vertices_m, bank.triangles).volume_m3;
+    if (!(stored_m3 > 0.0))
+      model.fail("indices", "its triangles enclose no volume or face inward; a bank needs a closed surface that faces outward");
+    std::optional<base::Object> own = model.object_if("massProperties");
+    const std::optional<double> model_kg = own ? std::optional(own->number("mass", base::kPositive)) : std::nullopt;
+    const std::optional<double> density = reading_->material == nullptr ? std::optional(bank.material.density_kg_m3) : std::nullopt;
+    const ScaleChoice choice = choose_scale({.scale = placement.scale,
+                                             .model_kg = model_kg,
+                                             .body_kg = placement.mass_kg,
+                                             .density_kg_m3 = density,
+                                             .volume_m3 = stored_m3,
+                                             .lowest_hz = *std::min_element(model_.freq_hz.begin(), model_.freq_hz.end()),
+                                             .is_unscaled = reading_->scales_frequencies});
+    (choice.is_sure ? reading_of_scale_ : warnings_.emplace_back()) = choice.reason;
+    const double factor = choice.is_unscaled ? placement.scale : 1.0;
+    for (Vec3& p : bank.vertices_m) p = placement.scale * p;
+
     std::vector<double> lambda(modes);
     for (std::size_t m = 0; m < modes; ++m)
       lambda[m] = std::pow(2.0 * std::numbers::pi * model_.freq_hz[m], 2) + model_.decay_per_s[m] * model_.decay_per_s[m];
     const std::vector<std::size_t> order = base::find_sort_order(lambda);
+    // Mass-normalised for the mass of the model; the body may have another one.
+    const double cube = std::pow(factor, 3);
+    const double mass_ratio = model_kg && placement.mass_kg ? *model_kg / *placement.mass_kg : 1.0 / cube;
+    const double turn = std::sqrt(mass_ratio);
     std::vector<double> shapes(3 * modes * points);
     for (std::size_t m = 0; m < modes; ++m) {
       bank.eigenvalue_rad2_s2.push_back(lambda[order[m]]);
@@ -452,13 +445,13 @@ class Reader {
         for (std::size_t c = 0; c < 3; ++c) {
           const double phi = model_.shapes.get(order[m] * model_.positions.size() + static_cast<std::size_t>(used_[v]), c);
           if (!std::isfinite(phi)) model.fail("shapes", fmt::format("mode {} moves point {} by {}", order[m], v, phi));
-          shapes[(v * modes + m) * 3 + c] = phi;
+          shapes[(v * modes + m) * 3 + c] = turn * phi;
         }
     }
-    bank.residual.assign(modes, 0.0);
-    read_mass(model, scale, bank);
     settle_damping(bank);
-    if (is_of_unscaled_body) scale_body(bank, shapes, node_scale);
+    if (choice.is_unscaled) scale_modes(bank, factor);
+    read_mass(model, placement, calc_solid(bank.vertices_m, bank.triangles), factor, bank);
+    bank.residual.assign(modes, 0.0);
     bank::quantise_shapes(bank, shapes);
     bank::set_radiation_gains(bank, shapes);
     bank.counts = {.nodes = static_cast<std::int64_t>(points), .tets = 1, .components = 1, .rigid_modes = 6};
@@ -469,31 +462,100 @@ class Reader {
     bank.provenance = base::Json::object()
                           .set("imported", kExtension)
                           .set("file", base::printable(file_.name()))
-                          .set("notes", base::Json::array(notes_))
+                          .set("notes", base::Json::array(list_notes()))
                           .line();
     if (const std::vector<std::string> faults = bank::find_faults(bank); !faults.empty())
-      throw InputError(
-          fmt::format("{}: its model is not a valid bank: {}; correct it in the program that made it", file_.name(), faults[0]));
+      model.fail("", fmt::format("is not a valid bank: {}; correct it in the program that made it", faults[0]));
     return bank;
   }
 
-  gltf::File file_;
+  std::vector<std::string> list_notes() const {
+    std::vector<std::string> notes = warnings_;
+    if (!reading_of_scale_.empty()) notes.insert(notes.begin(), reading_of_scale_);
+    return notes;
+  }
+
+  gltf::File& file_;
   const GlbReading* reading_;
-  base::Object root_;
-  std::size_t number_ = 0;  // index of the model
+  base::Object root_, extension_;
   Model model_;
   std::vector<std::int32_t> used_;  // used points of another program's model
-  std::vector<std::string> notes_;
+  std::string reading_of_scale_;
+  std::vector<std::string> warnings_;
   std::map<std::string, bank::FieldBytes> fields_;
 };
 
+/// The first node with the model.
+Placement find_placement(base::Object root, std::size_t number) {
+  gltf::Graph graph = gltf::read_graph(root);
+  for (std::size_t n = 0; n < graph.nodes.size(); ++n) {
+    std::optional<base::Object> extensions = graph.nodes[n].object_if("extensions");
+    std::optional<base::Object> own = extensions ? extensions->object_if(kExtension) : std::nullopt;
+    if (!own || own->integer_if("modalModel", 0, std::numeric_limits<std::int32_t>::max()) != static_cast<long long>(number)) continue;
+    std::optional<base::Object> physics = extensions->object_if(kPhysicsExtension);
+    std::optional<base::Object> motion = physics ? physics->object_if("motion") : std::nullopt;
+    Placement placement = motion ? read_motion(*motion) : Placement{};
+    placement.scale = require_scale(graph, n);
+    return placement;
+  }
+  return {};
+}
+
 }  // namespace
 
+ModelBank read_model(gltf::File& file, std::size_t number, const Placement& placement, const GlbReading& reading) {
+  return Reader(file, reading).read(number, placement);
+}
+
+double require_scale(gltf::Graph& graph, std::size_t node) {
+  const std::optional<double> scale = gltf::find_scale(graph.global[node]);
+  if (!scale)
+    graph.nodes[node].fail("",
+                           "is mirrored, or not scaled by the same along all axes, which changes the modes; apply the scale, and compute "
+                           "them again");
+  return *scale;
+}
+
+bool take_inertia(const std::array<double, 9>& given, std::array<double, 9>& of_surface) {
+  const Eigen::Map<const Eigen::Matrix3d> tensor(given.data());  // symmetric
+  Eigen::Map<Eigen::Matrix3d> surface(of_surface.data());
+  const Eigen::Matrix3d about = 0.5 * tensor.trace() * Eigen::Matrix3d::Identity() - tensor;
+  const Eigen::LLT<Eigen::Matrix3d> root(surface);
+  if (!tensor.allFinite() || root.info() != Eigen::Success) return false;
+  // Moments about all axes at once: the eigenvalues of L^-1 (given - surface) L^-T.
+  Eigen::Matrix3d difference = tensor - surface;
+  root.matrixL().solveInPlace(difference);
+  difference.transposeInPlace();
+  root.matrixL().solveInPlace(difference);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(0.5 * (difference + difference.transpose()), Eigen::EigenvaluesOnly);
+  const bool is_possible = Eigen::LLT<Eigen::Matrix3d>(about).info() == Eigen::Success;
+  if (!is_possible || !(solver.eigenvalues().cwiseAbs().maxCoeff() <= kInertiaTolerance)) return false;
+  surface = tensor;
+  return true;
+}
+
+Placement read_motion(base::Object& motion) {
+  Placement placement;
+  if (motion.has("mass")) {
+    const double mass = motion.number("mass");
+    if (!(mass >= 0.0)) motion.fail("mass", fmt::format("is {:g} kg; it must not be negative", mass));
+    if (mass > 0.0) placement.mass_kg = mass;
+  }
+  if (motion.has("centerOfMass")) placement.centre_m = motion.numbers<3>("centerOfMass");
+  if (motion.has("inertiaDiagonal")) placement.inertia_kg_m2 = read_inertia(motion);
+  return placement;
+}
+
 bank::Bank parse_glb(std::string_view bytes, const std::string& name, const GlbReading& reading, std::vector<std::string>* notes) {
-  Reader reader(bytes, name, reading);
-  bank::Bank bank = reader.read();
-  if (notes != nullptr) *notes = reader.get_notes();
-  return bank;
+  gltf::File file = gltf::parse(bytes, name);
+  Reader reader(file, reading);
+  const std::size_t number = reader.choose_model();
+  ModelBank made = reader.read(number, find_placement(file.root(), number));
+  if (notes != nullptr) {
+    *notes = std::move(made.warnings);
+    if (!made.reading.empty()) notes->insert(notes->begin(), made.reading);
+  }
+  return std::move(made.bank);
 }
 
 }  // namespace carillon::exchange

@@ -2,6 +2,7 @@
 // import. docs/howto/export.md describes the file.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <optional>
@@ -10,11 +11,16 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/vector.hpp"
+#include "runtime/exchange/gltf/file.hpp"
+#include "runtime/exchange/gltf/nodes.hpp"
 #include "runtime/material/material.hpp"
 
 namespace carillon::exchange {
 
 inline constexpr const char* kExtension = "KHR_audio_rigid_bodies";
+inline constexpr const char* kPhysicsExtension = "KHR_physics_rigid_bodies";
 
 struct GlbOptions {
   std::string name = "body";  // name of mesh, node and model
@@ -30,11 +36,39 @@ struct GlbReading {
   std::optional<std::size_t> model{};            // index of the model, if several
   bool ignores_extras = false;                   // read the extension only
   const material::Material* material = nullptr;  // for models without a material
+  std::optional<bool> scales_frequencies{};      // of a scaled node; empty: by the masses (scale_rule.hpp)
 };
 
+/// A node with a model: its scale, and the rigid-body data that KHR_physics_rigid_bodies gives it, in the space of the node.
+struct Placement {
+  double scale = 1.0;
+  std::optional<double> mass_kg{};
+  std::optional<Vec3> centre_m{};                        // unscaled, as positions
+  std::optional<std::array<double, 9>> inertia_kg_m2{};  // (3, 3) about the centre, axes of the node
+};
+
+struct ModelBank {
+  bank::Bank bank;
+  std::string reading;  // of the scale, in words; empty without scale
+  std::vector<std::string> warnings;
+};
+
+/// Bank of model `number` at a node. Mass and centre are those of the node, else of the model, else of its surface; the moments those of
+/// the surface if they contradict it. Throws InputError as parse_glb().
+ModelBank read_model(gltf::File& file, std::size_t number, const Placement& placement, const GlbReading& reading);
+
+/// The motion of a node, for Placement. `motion`: as in KHR_physics_rigid_bodies. A mass of 0, which means infinity, is left out.
+Placement read_motion(base::Object& motion);
+
+/// Takes a tensor in place of that of a surface filled evenly, unless no solid has it or it differs by more than 5 % about any axis. False
+/// if it is not taken.
+bool take_inertia(const std::array<double, 9>& given, std::array<double, 9>& of_surface);
+
+/// Scale of a node in the world. Throws InputError with its path for one that modes cannot have.
+double require_scale(gltf::Graph& graph, std::size_t node);
+
 /// Imports a GLB or glTF file `name`, with separate buffers in the same folder. From write_glb(): the same bank, bit by bit. From another
-/// program: surface, frequencies, decays and shapes (16 bits) of the extension, and its mass properties, else those of the surface filled
-/// with the material. For a scaled node, the density of the material decides to which size modes and mass belong, noted in `notes`. Throws
+/// program: surface, frequencies, decays and shapes (16 bits) of the extension, at the first node with the model (read_model()). Throws
 /// InputError that begins with the name for damaged, modified and incomplete files.
 bank::Bank parse_glb(std::string_view bytes, const std::string& name, const GlbReading& reading = {},
                      std::vector<std::string>* notes = nullptr);

@@ -242,7 +242,12 @@ void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
                  "GLB or glTF file (.glb, .gltf with its buffers), or modes of CalculiX (.frd), of Nastran (.pch) or in a universal file "
                  "(.unv, .uff)")
       ->required();
-  app.add_option("-o,--output", wishes.out, "Output bank; -: standard output")->required();
+  app.add_option("-o,--output", wishes.out, "Output bank; -: standard output. For a whole glTF scene: a folder, a name without extension")
+      ->required();
+  app.add_option_function<std::string>(
+         "--scale-frequencies", [&wishes](const std::string& word) { wishes.scales_frequencies = word == "yes"; },
+         "Whether modes of scaled nodes are of the unscaled geometry, so that the scale divides their frequencies; default: by the masses")
+      ->check(CLI::IsMember({"yes", "no"}));
   app.add_option("--model", wishes.model, "Index of the modal model in the file, from 0")
       ->check(base::whole_range(0, kMost), base::describe_whole_range(0, kMost));
   app.add_option("--material", wishes.material,
@@ -252,6 +257,26 @@ void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
                  "Units of modes of other solvers, m-kg-s or mm-t-s; default: the former, for bodies of at most 10 m")
       ->check(CLI::IsMember({"m-kg-s", "mm-t-s"}));
   app.add_flag("--plain", wishes.is_plain, "Read only the extension, ignoring the extras of carillon-bank export");
+}
+
+void add_silent(CLI::App& app, exchange::SilentWishes& wishes) {
+  app.add_option("BODY", wishes.body,
+                 "box:X,Y,Z, sphere:RADIUS, cylinder:HEIGHT,RADIUS or capsule:HEIGHT,RADIUS [m], a closed surface (.obj) or a bank")
+      ->required();
+  app.add_option("-o,--output", wishes.out, "Output bank; -: standard output")->required();
+  app.add_option("--material", wishes.material, "Material name (carillon materials); the next four replace its numbers");
+  app.add_option("--density", wishes.density_kg_m3, "Density [kg/m3]")->check(CLI::PositiveNumber);
+  app.add_option("--mass", wishes.mass_kg, "Mass [kg] instead of the density")->check(CLI::PositiveNumber);
+  app.add_option("--young", wishes.young_modulus_pa, "Young's modulus [Pa]; default: concrete")->check(CLI::PositiveNumber);
+  app.add_option("--poisson", wishes.poisson_ratio, "Poisson's ratio; default: concrete")->check(CLI::Range(-0.999, 0.499));
+}
+
+/// A glTF file goes into a folder: an existing one, or a name without extension.
+bool is_scene_import(const exchange::ImportWishes& wishes) {
+  const std::string ending = base::find_extension(wishes.file);
+  std::error_code error;
+  return (ending == ".gltf" || ending == ".glb") && !base::is_standard_output(wishes.out) &&
+         (wishes.out.filename().empty() || base::find_extension(wishes.out).empty() || std::filesystem::is_directory(wishes.out, error));
 }
 
 void edit(const std::string& file, const std::string& out, Wishes& wishes) {
@@ -319,6 +344,7 @@ struct Options {
   Wishes wishes;
   exchange::ExportWishes exported;
   exchange::ImportWishes imported;
+  exchange::SilentWishes silent;
 };
 
 void add_commands(CLI::App& app, Options& options) {
@@ -369,9 +395,10 @@ void add_commands(CLI::App& app, Options& options) {
       options.exported);
   add_import(
       *app.add_subcommand("import",
-                          "Imports a GLB or glTF file with KHR_audio_rigid_bodies as a bank, lossless for exported files; or modes of "
-                          "other solvers (.frd, .pch, .unv, .uff)"),
+                          "Imports a GLB or glTF file with KHR_audio_rigid_bodies as a bank, lossless for exported files, or as a scene "
+                          "in a folder; or modes of other solvers (.frd, .pch, .unv, .uff)"),
       options.imported);
+  add_silent(*app.add_subcommand("silent", "Makes a bank without modes: a body that collides and does not vibrate"), options.silent);
 }
 
 void run_compare(const Options& options) {
@@ -423,8 +450,13 @@ int run(int argc, char** argv) {
   if (command == "edit") edit(options.file, options.edited, options.wishes);
   if (command == "export") exchange::run_export(options.exported);
   if (command == "import") {
-    if (!base::is_standard_output(options.imported.out)) check_bank_name(options.imported.out);
+    options.imported.is_scene = is_scene_import(options.imported);
+    if (!options.imported.is_scene && !base::is_standard_output(options.imported.out)) check_bank_name(options.imported.out);
     exchange::run_import(options.imported);
+  }
+  if (command == "silent") {
+    check_output(options.silent.out.string());
+    exchange::run_silent(options.silent);
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return 0;

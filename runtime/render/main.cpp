@@ -15,6 +15,7 @@
 #include "runtime/base/version.hpp"
 #include "runtime/base/whole_range.hpp"
 #include "runtime/render/batch.hpp"
+#include "runtime/render/gltf_input.hpp"
 #include "runtime/render/program.hpp"
 #include "runtime/scene/scene.hpp"
 
@@ -43,7 +44,9 @@ int guard(Work&& work) {
 
 int try_run(const carillon::render::ProgramOptions& options) {
   return guard([&] {
-    carillon::render::run(options);
+    carillon::render::ProgramOptions own = options;
+    const auto folder = carillon::render::convert_gltf(own);
+    carillon::render::run(own);
     return 0;
   });
 }
@@ -64,7 +67,9 @@ int main(int argc, char** argv) {
     return carillon::base::printable_lines(CLI::FailureMessage::simple(asked, error));
   });
   int jobs = 0;
-  app.add_option("scene", options.scene, "Scene file (JSON); with --jobs a manifest of scenes")->required()->option_text("SCENE.json");
+  app.add_option("scene", options.scene, "Scene file (JSON, or glTF with KHR_audio_rigid_bodies); with --jobs a manifest of scenes")
+      ->required()
+      ->option_text("SCENE");
   auto* output =
       app.add_option("-o,--output", options.sound,
                      "Sound to write: .wav, .flac, .opus or .ogg; a channel for each ear or microphone; - is WAV to standard output; "
@@ -87,6 +92,10 @@ int main(int argc, char** argv) {
   auto* batch = app.add_option("--jobs", jobs, "Render the scenes of a manifest, so many at once; one that fails stops no other")
                     ->check(carillon::base::whole_range(1, 1024), carillon::base::describe_whole_range(1, 1024))
                     ->option_text("N");
+  app.add_option_function<std::string>(
+         "--scale-frequencies", [&options](const std::string& word) { options.scales_frequencies = word == "yes"; },
+         "Of a glTF scene: whether the scale of nodes divides the frequencies of their models; default: by the masses")
+      ->check(CLI::IsMember({"yes", "no"}));
   app.add_flag("--audit", options.audit,
                "Audit energy (motion, modes, losses, radiation, balance error) and contacts (penetration depth, hit rate)");
   app.add_flag("--plan", options.plan,

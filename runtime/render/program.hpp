@@ -16,6 +16,7 @@ struct ProgramOptions {
   std::optional<std::filesystem::path> labels;  // .npz or .jsonl
   std::optional<int> rate_hz;                   // overrides the scene's
   std::optional<std::string> format;            // overrides the scene's
+  std::optional<bool> scales_frequencies;       // of scaled nodes of a glTF scene; empty: by the masses
   bool audit = false;                           // energy balance
   bool plan = false;                            // print the planned effects with reasons; no sound
   bool quiet = false;                           // print warnings only

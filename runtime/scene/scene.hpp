@@ -71,6 +71,7 @@ struct SceneBody {
   std::shared_ptr<const radiation::Transfers> transfers{};  // of the bank, once read, if it has multipoles
   radiation::Limited limited;                               // radiation gains limited by damping
   double variation = 0.0;                                   // variation of equal strikes, 0..1
+  double gain = 1.0;                                        // factor of the pressure
 };
 
 /// A body that plays a recorded surface (docs/surface-format.md), outside the physics.

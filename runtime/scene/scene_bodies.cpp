@@ -33,6 +33,7 @@ const base::Keys<SceneBody> kBody{
     {"supports", "none", "the same per support by name: `{\"left\": {\"on\": \"concrete wall\"}}`"},
     {"held", "none", "contact with a holder, or a list: `{\"by\": \"cord\", \"point_m\": [x, y, z]}` in the axes of the mesh"},
     {"variation", "the scene's", "variation of equal strikes; 0 to 1"},
+    {"gain", &SceneBody::gain, Limits{0, 1e6}, "factor of its pressure"},
     {"effects", "the scene's", "[effects](#effects) of this body"},
     {"nonlinear", "its effects", "[large motion](nonlinear-bodies.md): `\"auto\"`, true (needs a bank with a nonlinear energy) or false"}};
 const base::Keys<physics::BodySpec> kMotion{
@@ -207,6 +208,7 @@ SceneBody parse_body(base::Object& object, const Scene& scene) {
   physics::BodySpec& spec = body.spec;
   spec.name = body.name;
   kMotion.read(object, spec);
+  kBody.read(object, body);
   spec.initial.position_m = read_vector(object, "position_m", {0.0, 0.0, 0.0}, kFarthestM);
   spec.initial.rotation = read_rotation(object);
   if (spec.fixed) {

@@ -68,6 +68,7 @@ synth::BodySettings Session::make_settings(std::size_t body, synth::EffectSet ef
           .effects = effects,
           .silence_pa = scene_->quality.silence_pa.value_or(synth::BodySettings{}.silence_pa),
           .surface = make_surface(of),
+          .gain = of.gain,
           .isa = scene_->quality.instructions};
 }
 

@@ -162,7 +162,7 @@ float SoundingBody::calc_nearness(const ListenerTracks& listener, std::int64_t s
     for (std::size_t k = 0; k < 3; ++k) square += (there[k] + place[k] - here[k]) * (there[k] + place[k] - here[k]);
     nearest = std::min(nearest, square);
   }
-  return static_cast<float>(1.0 / std::max(std::sqrt(nearest), kNearestM));
+  return std::max(frame_.gain, 1e-6F) * static_cast<float>(1.0 / std::max(std::sqrt(nearest), kNearestM));
 }
 
 bool SoundingBody::is_asleep() const noexcept {
@@ -297,6 +297,11 @@ void SoundingBody::count_modal_work(const ResonatorCounters& before, std::int64_
   for (const float p : mono) work_.peak_pa = std::max(work_.peak_pa, std::abs(p));
 }
 
+void SoundingBody::amplify(std::span<float> sound) const noexcept {
+  if (frame_.gain == 1.0F) return;
+  for (float& p : sound) p *= frame_.gain;
+}
+
 /// Sound of the modes, into their delay lines.
 void SoundingBody::make_modal_sound(std::span<float> mono) noexcept {
   const auto count = static_cast<std::int64_t>(mono.size());
@@ -311,9 +316,13 @@ void SoundingBody::make_modal_sound(std::span<float> mono) noexcept {
   const bool touched = contacts_ && !contacts_->is_resting();
   const std::int64_t contact_samples = touched ? contacts_->get_counters().samples : -1;
   modes_->process(mono);
+  amplify(mono);
   count_modal_work(before, contact_samples, mono);
-  for (std::size_t e = 0; e < propagation_->directed_lines.size(); ++e)
-    propagation_->directed_lines[e].push(propagation_->directed->weights->get_sound(e).first(mono.size()));
+  for (std::size_t e = 0; e < propagation_->directed_lines.size(); ++e) {
+    const std::span<float> sound = propagation_->directed->weights->get_sound(e).first(mono.size());
+    amplify(sound);
+    propagation_->directed_lines[e].push(sound);
+  }
   if (propagation_->monopole) propagation_->monopole->push(mono);
 }
 
@@ -326,6 +335,7 @@ void SoundingBody::make_acceleration_noise(const std::array<std::span<float>, 3>
     noise.skip(count);
   } else {
     noise.process(dipole);
+    for (const std::span<float>& axis : dipole) amplify(axis);
     int bad = 0;
     for (const std::span<float>& axis : dipole)
       for (const float p : axis) bad |= static_cast<int>(!(std::abs(p) <= std::numeric_limits<float>::max()));

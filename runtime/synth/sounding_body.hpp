@@ -31,6 +31,7 @@ struct BodyFrame {
   double silence_pa = 1e-10;
   Isa isa = Isa::kBest;
   ContactSurface surface{};
+  float gain = 1.0F;  // factor of its pressure
   bool audits_energy = false;
 };
 
@@ -147,6 +148,7 @@ class SoundingBody {
   std::unique_ptr<BodyAccelerationNoise> make_noise(const Model& model) const;
   std::unique_ptr<ContactForces> make_contacts(const std::shared_ptr<const Model>& model, const ContactSurface& surface) const;
   ContactSurface make_surface(const Model& model) const;
+  void amplify(std::span<float> sound) const noexcept;  // by its gain
   void make_modal_sound(std::span<float> mono) noexcept;
   void count_modal_work(const ResonatorCounters& before, std::int64_t contact_samples, std::span<const float> mono) noexcept;
   void begin_directed_block(std::int64_t sample, const ListenerTracks& listener) noexcept;

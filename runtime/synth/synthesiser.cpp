@@ -141,6 +141,7 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   // Also checked for bodies without modes.
   if (!(settings.silence_pa > 0.0) || !std::isfinite(settings.silence_pa))
     throw InputError("silence_pa of a body must be a positive number");
+  if (!(settings.gain >= 0.0 && settings.gain <= 1e6)) throw InputError("the gain of a body must be 0 to 1e6");
   if (const char* fault = find_fault(settings.surface); fault != nullptr) throw InputError(std::string("surface of a body: ") + fault);
   collect();
   const std::size_t free = find_free();
@@ -161,6 +162,7 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
                 .silence_pa = settings.silence_pa,
                 .isa = settings.isa,
                 .surface = settings.surface,
+                .gain = static_cast<float>(settings.gain),
                 .audits_energy = settings.audits_energy},
       settings.effects, settings.position_m, settings.rotation);
   Published& published = published_bodies_[free];

@@ -62,6 +62,7 @@ struct BodySettings {
   EffectSet effects = kDefaultEffects;
   double silence_pa = 1e-10;  // ResonatorOptions
   ContactSurface surface{};   // in lasting contacts
+  double gain = 1.0;          // factor of its pressure
   double longest_m = 0.0;     // 0: SynthesiserOptions::longest_m
   int max_waypoints = 0;      // 0: SynthesiserOptions::max_waypoints
   int max_forces = -1;        // -1: SynthesiserOptions::max_forces

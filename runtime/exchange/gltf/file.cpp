@@ -91,6 +91,7 @@ std::optional<std::size_t> find_index(base::Object& object, const char* key, std
 
 File::File(std::string_view json, std::optional<std::string_view> binary, const std::string& name)
     : name_(name), document_(parse_json(json, name)), root_(document_.root()) {
+  document_.show_paths();
   check();
   views_ = root_.objects("bufferViews");
   accessors_ = root_.objects("accessors");

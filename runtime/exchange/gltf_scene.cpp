@@ -1,0 +1,730 @@
+// Method: a node with motion begins a body, which takes the model and the colliders below it; models and colliders without motion are fixed
+//   bodies. A body collides by the surface of its model, else by its colliders. The lowest level of static boxes becomes the ground.
+// Source: KHR_audio_rigid_bodies (K. Hiner, draft of 2026-08), KHR_physics_rigid_bodies and KHR_implicit_shapes (drafts).
+// Deviations: joints, collision filters, kinematic motion, texture of surfaces beyond the roughness, and static friction are left out.
+#include "runtime/exchange/gltf_scene.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "runtime/bank/write.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/printable.hpp"
+#include "runtime/exchange/gltf/file.hpp"
+#include "runtime/exchange/gltf/nodes.hpp"
+#include "runtime/exchange/silent.hpp"
+#include "runtime/material/solids.hpp"
+
+namespace carillon::exchange {
+namespace {
+
+constexpr const char* kShapesExtension = "KHR_implicit_shapes";
+constexpr std::uint64_t kMaxSceneBytes = 1ULL << 32;
+constexpr std::size_t kMaxSceneBodies = 1000, kMaxMeshCorners = 30'000'000;
+constexpr double kSceneSeconds = 4.0;
+constexpr double kLevel = 1e-6;                                                  // heights of one level, and directions of one line
+constexpr double kLikeShape = 0.01;                                              // extents of a collider and of the surface of a model
+constexpr double kFarM = 1e4, kFastMS = 300.0, kFastRadS = 1e4, kRoughM = 1e-3;  // limits of scene files
+constexpr double kDefaultRoughnessM = 2e-6, kDefaultFriction = 0.6, kDefaultRestitution = 0.0;  // of the extensions
+
+Eigen::Matrix3d get_linear(const gltf::Matrix& m) {
+  Eigen::Matrix3d linear;
+  linear << m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10];
+  return linear;
+}
+
+Eigen::Vector3d get_place(const gltf::Matrix& m) { return {m[12], m[13], m[14]}; }
+Eigen::Vector3d to_eigen(const Vec3& v) { return {v[0], v[1], v[2]}; }
+Vec3 to_vec3(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
+
+/// y up to z up.
+Eigen::Vector3d raise(const Eigen::Vector3d& v) { return {v[0], -v[2], v[1]}; }
+
+/// The nearest rotation; that of a reflection is of its negative.
+Eigen::Matrix3d find_rotation(const Eigen::Matrix3d& linear) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(linear, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d turn = svd.matrixU() * svd.matrixV().transpose();
+  return turn.determinant() < 0.0 ? Eigen::Matrix3d(-turn) : turn;
+}
+
+base::Json make_list(const Eigen::Vector3d& v) { return base::Json::array(std::array<double, 3>{v[0] + 0.0, v[1] + 0.0, v[2] + 0.0}); }
+
+/// Restitution or friction of a body, and how it combines with that of another one.
+struct Contact {
+  double value = 0.0;
+  std::string mode;
+  auto operator<=>(const Contact&) const = default;
+};
+
+double combine(const Contact& a, const Contact& b) {
+  for (const Contact* of : {&a, &b})
+    if (of->mode == "average") return 0.5 * (a.value + b.value);
+  for (const Contact* of : {&a, &b})
+    if (of->mode == "minimum") return std::min(a.value, b.value);
+  for (const Contact* of : {&a, &b})
+    if (of->mode == "maximum") return std::max(a.value, b.value);
+  return a.value * b.value;
+}
+
+struct Body {
+  std::optional<std::size_t> motion, model_node, model;  // nodes; index of the model
+  std::vector<std::size_t> colliders;                    // nodes
+  bool is_fixed = true, is_in_ground = false;
+  std::string name;
+  base::Json entry;                                 // of the scene file
+  std::optional<Contact> restitution, friction;     // of a physics material
+  std::vector<std::optional<std::size_t>> kind{};   // physics material and acoustic surface, to compare
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // z up
+  double lowest_m = 0.0;                            // of its surface, at the start
+};
+
+struct KnownBank {
+  std::string file;
+  std::vector<Vec3> corners;  // vertices of the surface
+};
+
+/// A static box with level faces; world, z up.
+struct Slab {
+  std::size_t body = 0;
+  double top_m = 0.0;
+  std::array<double, 2> low{}, high{};  // of its footprint
+};
+
+class SceneReader {
+ public:
+  using Sink = std::function<void(const std::string&, const bank::Bank&)>;
+  SceneReader(std::string_view bytes, const std::string& name, const GlbReading& reading, const Sink& sink)
+      : file_(gltf::parse(bytes, name)), reading_(&reading), sink_(&sink), root_(file_.root()), graph_(gltf::read_graph(root_)) {}
+
+  GltfScene read() {
+    open_extensions();
+    find_bodies();
+    for (Body& body : bodies_)
+      if (body.model || body.motion) make_body(body);
+    find_ground();
+    for (Body& body : bodies_)
+      if (!body.model && !body.motion && !body.is_in_ground) make_body(body);
+    settle("restitution", &Body::restitution, 1.0);
+    settle("friction", &Body::friction, 10.0);
+    write_scene();
+    return std::move(made_);
+  }
+
+ private:
+  void open_extensions() {
+    std::optional<base::Object> extensions = root_.object_if("extensions");
+    const auto open = [&](const char* extension, const char* key) {
+      std::optional<base::Object> own = extensions ? extensions->object_if(extension) : std::nullopt;
+      return own ? own->objects(key) : std::vector<base::Object>();
+    };
+    models_ = open(kExtension, "modalModels");
+    materials_ = open(kExtension, "acousticMaterials");
+    surfaces_ = open(kExtension, "acousticSurfaces");
+    physics_materials_ = open(kPhysicsExtension, "physicsMaterials");
+    shapes_ = open(kShapesExtension, "shapes");
+    meshes_ = root_.objects("meshes");
+    audio_.resize(graph_.nodes.size());
+    physics_.resize(graph_.nodes.size());
+  }
+
+  std::string name_node(std::size_t n) {
+    const std::string name = graph_.nodes[n].has_string("name") ? base::printable(graph_.nodes[n].string_or("name", "")) : "";
+    return name.empty() ? fmt::format("nodes[{}]", n) : fmt::format("nodes[{}] (\"{}\")", n, name);
+  }
+  void warn(std::size_t n, const std::string& text) { made_.warnings.push_back(fmt::format("{}: {}", name_node(n), text)); }
+
+  // ---- bodies of the graph ----
+
+  void find_bodies() {
+    const std::size_t count = graph_.nodes.size();
+    std::vector<std::optional<std::size_t>> moving(count), sounding(count);  // body of a node by motion, and by a fixed model
+    for (const std::size_t n : graph_.in_scene) {
+      std::optional<base::Object> extensions = graph_.nodes[n].object_if("extensions");
+      if (extensions) {
+        audio_[n] = extensions->object_if(kExtension);
+        physics_[n] = extensions->object_if(kPhysicsExtension);
+        if (extensions->has("EXT_mesh_gpu_instancing")) warn(n, "its instances (EXT_mesh_gpu_instancing) are left out; make them nodes");
+      }
+      if (const std::optional<std::size_t> parent = graph_.parent[n]) {
+        moving[n] = moving[*parent];
+        sounding[n] = sounding[*parent];
+      }
+      if (!camera_ && graph_.nodes[n].has("camera")) camera_ = n;
+      if (physics_[n] && physics_[n]->has("motion")) {
+        moving[n] = add_body();
+        sounding[n].reset();
+        bodies_.back().motion = n;
+      }
+      if (physics_[n] && physics_[n]->has("joint")) warn(n, "its joint is left out: the body moves freely");
+      const std::optional<std::size_t> model =
+          audio_[n] ? gltf::find_index(*audio_[n], "modalModel", models_.size(), "modal model") : std::nullopt;
+      if (model && moving[n] && bodies_[*moving[n]].model) {
+        warn(n, "it is part of a body that has a model already; its own is left out");
+      } else if (model) {
+        if (!moving[n]) sounding[n] = add_body();
+        Body& body = bodies_[*(moving[n] ? moving[n] : sounding[n])];
+        body.model = model;
+        body.model_node = n;
+      }
+      if (physics_[n] && physics_[n]->has("collider")) {
+        const std::size_t body = moving[n] ? *moving[n] : sounding[n] ? *sounding[n] : add_body();
+        bodies_[body].colliders.push_back(n);
+      }
+    }
+    if (bodies_.empty())
+      throw InputError(fmt::format("{}: its scene has no body: no node has a modal model ({}), a motion or a collider ({})", file_.name(),
+                                   kExtension, kPhysicsExtension));
+  }
+
+  std::size_t add_body() {
+    if (bodies_.size() >= kMaxSceneBodies)
+      root_.fail("nodes", fmt::format("there are more than {} bodies; export fewer of them", kMaxSceneBodies));
+    bodies_.emplace_back();
+    return bodies_.size() - 1;
+  }
+
+  std::size_t find_first_node(const Body& body) const {
+    return body.motion ? *body.motion : body.model_node ? *body.model_node : body.colliders.front();
+  }
+
+  /// A name in the scene file: unique, without control characters.
+  std::string choose_name(std::size_t n) {
+    constexpr std::size_t kMaxBytes = 150;
+    std::string name = graph_.nodes[n].has_string("name") ? graph_.nodes[n].string_or("name", "") : "";
+    std::erase_if(name, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+    if (name.size() > kMaxBytes) {
+      std::size_t end = kMaxBytes;
+      while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;  // whole characters of UTF-8
+      name.resize(end);
+    }
+    if (name.empty()) name = fmt::format("node {}", n);
+    std::string unique = name;
+    for (int k = 2; !names_.insert(unique).second; ++k) unique = fmt::format("{} {}", name, k);
+    return unique;
+  }
+
+  // ---- one body ----
+
+  void make_body(Body& body) {
+    if (body.motion) {
+      base::Object motion = physics_[*body.motion]->object("motion");
+      const bool is_kinematic = motion.boolean_or("isKinematic", false), is_heavy = motion.has("mass") && motion.number("mass") == 0.0;
+      body.is_fixed = is_kinematic || is_heavy;
+      if (motion.number_or("gravityFactor", 1.0) != 1.0) warn(*body.motion, "its gravityFactor is left out: it falls as the others");
+    }
+    if (!body.model && body.colliders.empty()) {
+      warn(*body.motion, "it has no collider and no model, hence no surface; it is left out");
+      return;
+    }
+    body.entry = base::Json::object();
+    if (body.model)
+      make_sounding(body);
+    else if (!make_silent(body))
+      return;
+    const std::size_t node = find_first_node(body);
+    body.name = choose_name(node);
+    if (body.is_fixed) body.entry.set("fixed", true);
+    if (body.motion) read_velocity(body);
+    read_contact(body);
+    for (std::size_t c = 0; c < 3; ++c)
+      if (!(std::abs(body.place[static_cast<int>(c)]) <= kFarM))
+        graph_.nodes[node].fail("", fmt::format("it is {:.3g} m from the origin; at most {:g} m are rendered", body.place.norm(), kFarM));
+    ++made_.bodies;
+  }
+
+  void set_pose(Body& body, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& place) {
+    Eigen::Matrix3d up;
+    up << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+    const Eigen::Quaterniond q = Eigen::Quaterniond(up * rotation).normalized();
+    body.place = raise(place);
+    body.entry.set("position_m", make_list(body.place));
+    body.entry.set("quaternion", base::Json::array(std::array<double, 4>{q.w(), q.x(), q.y(), q.z()}));
+  }
+
+  /// Mass, centre and inertia of the motion in the space of another node of the body.
+  Placement read_placement(const Body& body, const Eigen::Matrix3d& frame, const Eigen::Vector3d& place, const Eigen::Matrix3d& rotation) {
+    if (!body.motion || body.is_fixed) return {};
+    base::Object motion = physics_[*body.motion]->object("motion");
+    Placement placement = read_motion(motion);
+    const gltf::Matrix& of = graph_.global[*body.motion];
+    if (placement.centre_m) {
+      const Eigen::Vector3d world = get_linear(of) * to_eigen(*placement.centre_m) + get_place(of);
+      placement.centre_m = to_vec3(frame.inverse() * (world - place));
+    }
+    if (placement.inertia_kg_m2) {
+      const Eigen::Matrix3d turn = rotation.transpose() * find_rotation(get_linear(of));
+      Eigen::Map<Eigen::Matrix3d> inertia(placement.inertia_kg_m2->data());
+      inertia = (turn * inertia * turn.transpose()).eval();
+    }
+    return placement;
+  }
+
+  static double round_scale(double scale) { return std::strtod(fmt::format("{:.11e}", scale).c_str(), nullptr); }
+
+  void make_sounding(Body& body) {
+    const std::size_t n = *body.model_node;
+    const double scale = round_scale(require_scale(graph_, n));
+    const Eigen::Matrix3d linear = get_linear(graph_.global[n]), rotation = find_rotation(linear);
+    const Eigen::Vector3d place = get_place(graph_.global[n]);
+    Placement placement = read_placement(body, linear, place, rotation);
+    placement.scale = scale;
+    std::string key = fmt::format("model {} {}", *body.model, scale);
+    if (placement.mass_kg) key += fmt::format(" m {}", *placement.mass_kg);
+    if (placement.centre_m)
+      key += fmt::format(" c {:.9e} {:.9e} {:.9e}", (*placement.centre_m)[0], (*placement.centre_m)[1], (*placement.centre_m)[2]);
+    if (placement.inertia_kg_m2)
+      for (const double x : *placement.inertia_kg_m2) key += fmt::format(" {:.9e}", x);
+    auto found = banks_.find(key);
+    if (found == banks_.end()) {
+      ModelBank model = read_model(file_, *body.model, placement, *reading_);
+      if (!model.reading.empty()) made_.readings.push_back(fmt::format("{}: {}", name_node(n), model.reading));
+      for (const std::string& warning : model.warnings) warn(n, warning);
+      base::Object& of = models_[*body.model];
+      const std::string name = of.has_string("name") ? of.string_or("name", "") : "";
+      found = banks_.emplace(key, put_bank(name.empty() ? fmt::format("model{}", *body.model) : name, model.bank)).first;
+    }
+    body.entry.set("bank", found->second.file);
+    set_pose(body, rotation, place);
+    const KnownBank& bank = found->second;
+    body.lowest_m = std::numeric_limits<double>::infinity();
+    for (const Vec3& corner : bank.corners) body.lowest_m = std::min(body.lowest_m, raise(rotation * to_eigen(corner) + place)[2]);
+    compare_colliders(body, bank, linear, place, scale);
+    if (audio_[n]->has("gain")) {
+      const double gain = audio_[n]->number("gain");
+      if (!(gain >= 0.0 && gain <= 1e6)) audio_[n]->fail("gain", fmt::format("is {:g}; give 0 to 1e6", gain));
+      if (gain != 1.0) body.entry.set("gain", gain);
+    }
+  }
+
+  /// The colliders of a sounding body should be like its surface, by which it collides.
+  void compare_colliders(const Body& body, const KnownBank& bank, const Eigen::Matrix3d& linear, const Eigen::Vector3d& place,
+                         double scale) {
+    if (body.colliders.empty()) return;
+    Surface surface;
+    for (const std::size_t n : body.colliders) add_surface(n, linear / scale, place, surface);
+    if (surface.vertices_m.empty()) return;
+    const auto find_box = [](const std::vector<Vec3>& points) {
+      Eigen::AlignedBox3d box;
+      for (const Vec3& p : points) box.extend(to_eigen(p));
+      return box;
+    };
+    const Eigen::AlignedBox3d own = find_box(bank.corners), of_collider = find_box(surface.vertices_m);
+    const double off =
+        std::max((own.min() - of_collider.min()).cwiseAbs().maxCoeff(), (own.max() - of_collider.max()).cwiseAbs().maxCoeff());
+    if (off > kLikeShape * own.sizes().maxCoeff())
+      warn(body.colliders.front(),
+           fmt::format("its collider differs from the surface of its model by {:.3g} m; it collides by the latter", off));
+  }
+
+  bool make_silent(Body& body) {
+    const std::size_t n = find_first_node(body);
+    const Eigen::Matrix3d linear = get_linear(graph_.global[n]), rotation = find_rotation(linear);
+    const Eigen::Vector3d place = get_place(graph_.global[n]);
+    SilentBody silent;
+    for (const std::size_t collider : body.colliders) add_surface(collider, rotation, place, silent.surface);
+    if (silent.surface.triangles.empty()) return false;
+    Placement placement;
+    if (body.motion && !body.is_fixed) {
+      // Centre: in metres, in the frame of the body.
+      placement = read_placement(body, rotation, place, rotation);
+      silent.centre_m = placement.centre_m;
+      silent.inertia_kg_m2 = placement.inertia_kg_m2;
+      silent.mass_kg = placement.mass_kg;
+    }
+    const std::optional<std::size_t> material = find_material(body);
+    if (material) {
+      base::Object& own = materials_[*material];
+      silent.young_modulus_pa =
+          read_positive(own, "youngsModulus", silent.young_modulus_pa, material::kMinStiffnessPa, material::kMaxStiffnessPa);
+      silent.density_kg_m3 = read_positive(own, "density", silent.density_kg_m3, material::kMinDensityKgM3, material::kMaxDensityKgM3);
+      silent.poisson_ratio = own.has("poissonRatio") ? own.number("poissonRatio", {-1.0, 0.5}) : silent.poisson_ratio;
+    }
+    if (body.motion && !body.is_fixed && !silent.mass_kg)
+      warn(n, fmt::format("its motion has no mass; {:g} kg/m^3 are taken", silent.density_kg_m3));
+    silent.origin = fmt::format("{}, node {}", file_.name(), n);
+    std::string key = fmt::format("silent {} {} {}", silent.young_modulus_pa, silent.poisson_ratio, silent.density_kg_m3);
+    if (silent.mass_kg) key += fmt::format(" m {}", *silent.mass_kg);
+    if (silent.centre_m) key += fmt::format(" c {:.9e} {:.9e} {:.9e}", (*silent.centre_m)[0], (*silent.centre_m)[1], (*silent.centre_m)[2]);
+    if (silent.inertia_kg_m2)
+      for (const double x : *silent.inertia_kg_m2) key += fmt::format(" {:.9e}", x);
+    for (const Vec3& v : silent.surface.vertices_m) key += fmt::format(" {:.9e} {:.9e} {:.9e}", v[0] + 0.0, v[1] + 0.0, v[2] + 0.0);
+    auto found = banks_.find(key);
+    if (found == banks_.end()) {
+      std::vector<std::string> warnings;
+      try {
+        const bank::Bank bank = make_silent_bank(silent, &warnings);
+        found = banks_.emplace(key, put_bank("silent", bank)).first;
+      } catch (const InputError& error) {
+        graph_.nodes[n].fail("", error.what());
+      }
+      for (const std::string& warning : warnings) warn(n, warning);
+    }
+    body.entry.set("bank", found->second.file);
+    set_pose(body, rotation, place);
+    body.lowest_m = std::numeric_limits<double>::infinity();
+    for (const Vec3& corner : found->second.corners) body.lowest_m = std::min(body.lowest_m, raise(rotation * to_eigen(corner) + place)[2]);
+    // In the draft only models sound, also by their acceleration.
+    body.entry.set("effects", base::Json::array());
+    return true;
+  }
+
+  static double read_positive(base::Object& owner, const char* key, double fallback, double low, double high) {
+    if (!owner.has(key)) return fallback;
+    const double value = owner.number(key);
+    if (!(value >= low && value <= high)) owner.fail(key, fmt::format("is {:g}; give {:g} to {:g}", value, low, high));
+    return value;
+  }
+
+  KnownBank put_bank(const std::string& name, const bank::Bank& bank) {
+    std::string stem;
+    for (const char c : name.substr(0, 60)) stem += std::isalnum(static_cast<unsigned char>(c)) ? c : '-';
+    std::string file = stem + ".hdf";
+    for (int k = 2; !files_.insert(file).second; ++k) file = fmt::format("{}-{}.hdf", stem, k);
+    (*sink_)(file, bank);
+    ++made_.banks;
+    return {file, bank.vertices_m};
+  }
+
+  void read_velocity(Body& body) {
+    base::Object motion = physics_[*body.motion]->object("motion");
+    const Eigen::Matrix3d rotation = find_rotation(get_linear(graph_.global[*body.motion]));
+    const auto read = [&](const char* key, double limit, const char* to, const char* unit) {
+      const Eigen::Vector3d velocity = raise(rotation * to_eigen(Vec3(motion.numbers_or<3>(key, {0, 0, 0}))));
+      if (!(velocity.cwiseAbs().maxCoeff() <= limit))
+        motion.fail(key, fmt::format("is {:.4g} {}; at most {:g} are rendered", velocity.norm(), unit, limit));
+      if (velocity.isZero(0.0)) return;
+      if (body.is_fixed)
+        warn(*body.motion, fmt::format("its {} is left out: bodies without a finite mass do not move", key));
+      else
+        body.entry.set(to, make_list(velocity));
+    };
+    read("linearVelocity", kFastMS, "velocity_m_s", "m/s");
+    read("angularVelocity", kFastRadS, "angular_velocity_rad_s", "rad/s");
+  }
+
+  // ---- surfaces of colliders ----
+
+  base::Object open_geometry(std::size_t n) {
+    base::Object collider = physics_[n]->object("collider");
+    return collider.object("geometry");
+  }
+
+  /// Shape of a collider in the space of its node.
+  Surface read_shape(std::size_t n) {
+    base::Object geometry = open_geometry(n);
+    if (geometry.has("shape") == geometry.has("node")) geometry.fail("", "must have one of \"shape\" and \"node\"; give one of them");
+    if (const auto node = gltf::find_index(geometry, "node", graph_.nodes.size(), "node")) {
+      if (geometry.boolean_or("convexHull", false)) warn(n, "its collider is the mesh itself, not its convex hull");
+      return read_mesh(*node);
+    }
+    base::Object& shape = shapes_[*gltf::find_index(geometry, "shape", shapes_.size(), "shape")];
+    const std::string type = shape.choice("type", {"box", "sphere", "cylinder", "capsule"});
+    base::Object own = shape.object(type);
+    if (type == "box") {
+      const Vec3 size = own.numbers<3>("size");
+      for (const double x : size)
+        if (!(x > 0.0 && x <= kFarM)) own.fail("size", fmt::format("has a side of {:g} m; give more than 0, at most {:g}", x, kFarM));
+      return make_box(size);
+    }
+    if (type == "sphere") return make_sphere(read_positive(own, "radius", 0.5, 1e-9, kFarM));
+    const double height = read_positive(own, "height", 0.5, 1e-9, kFarM);
+    const double bottom = read_positive(own, "radiusBottom", 0.25, 0.0, kFarM), top = read_positive(own, "radiusTop", 0.25, 0.0, kFarM);
+    if (!(std::max(bottom, top) > 0.0)) own.fail("radiusTop", "both radii are 0; give one that is not");
+    return type == "cylinder" ? make_cylinder(height, bottom, top) : make_capsule(height, bottom, top);
+  }
+
+  Surface read_mesh(std::size_t n) {
+    const std::optional<std::size_t> mesh = gltf::find_index(graph_.nodes[n], "mesh", meshes_.size(), "mesh");
+    if (!mesh) graph_.nodes[n].fail("", "a collider takes the mesh of this node, and it has none; name another node or a shape");
+    Surface surface;
+    for (base::Object& primitive : meshes_[*mesh].objects("primitives")) {
+      if (primitive.integer_if("mode", 0, 6).value_or(4) != 4) primitive.fail("mode", "must be 4, triangles; export it as triangles");
+      base::Object attributes = primitive.object("attributes");
+      const gltf::Numbers points = file_.read(attributes, "POSITION", "VEC3", gltf::kVertexTypes);
+      const std::size_t before = surface.vertices_m.size();
+      std::optional<gltf::Numbers> corners;
+      if (primitive.has("indices")) corners = file_.read(primitive, "indices", "SCALAR", gltf::kIndexTypes);
+      const std::size_t count = corners ? corners->count() : points.count();
+      if (before + points.count() > kMaxMeshCorners || 3 * surface.triangles.size() + count > kMaxMeshCorners)
+        primitive.fail("", "its mesh is too large for a collider; give a simpler one");
+      for (std::size_t i = 0; i < points.count(); ++i) {
+        const Vec3 p{points.get(i, 0), points.get(i, 1), points.get(i, 2)};
+        if (!is_finite(p)) attributes.fail("POSITION", fmt::format("point {} is not finite", i));
+        surface.vertices_m.push_back(p);
+      }
+      if (count % 3 != 0) primitive.fail("indices", fmt::format("{} corners are no whole number of triangles", count));
+      for (std::size_t i = 0; i < count; ++i) {
+        const double v = corners ? corners->get(i, 0) : static_cast<double>(i);
+        if (!(v < static_cast<double>(points.count())))
+          primitive.fail("indices", fmt::format("index {} is {}, but there are only {} points", i, v, points.count()));
+        if (i % 3 == 0) surface.triangles.emplace_back();
+        surface.triangles.back()[i % 3] = static_cast<std::int32_t>(before + static_cast<std::size_t>(v));
+      }
+    }
+    weld(surface);
+    return surface;
+  }
+
+  /// Adds the shape of a collider, in metres in a frame.
+  void add_surface(std::size_t n, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& place, Surface& to) {
+    const Eigen::Matrix3d linear = get_linear(graph_.global[n]);
+    if (linear.determinant() == 0.0) {
+      warn(n, "its scale is 0, which switches its collider off");
+      return;
+    }
+    Surface surface = read_shape(n);
+    const Eigen::Vector3d from = get_place(graph_.global[n]) - place;
+    const auto first = static_cast<std::int32_t>(to.vertices_m.size());
+    for (const Vec3& v : surface.vertices_m) to.vertices_m.push_back(to_vec3(rotation.transpose() * (linear * to_eigen(v) + from)));
+    for (Triangle triangle : surface.triangles) {
+      if (linear.determinant() < 0.0) std::swap(triangle[1], triangle[2]);
+      for (std::int32_t& v : triangle) v += first;
+      to.triangles.push_back(triangle);
+    }
+  }
+
+  // ---- contacts ----
+
+  std::optional<std::size_t> find_surface(const Body& body) {
+    std::vector<std::size_t> nodes = body.colliders;
+    nodes.insert(nodes.begin(), find_first_node(body));
+    if (body.model_node) nodes.insert(nodes.begin(), *body.model_node);
+    for (const std::size_t n : nodes)
+      if (audio_[n])
+        if (const auto surface = gltf::find_index(*audio_[n], "acousticSurface", surfaces_.size(), "acoustic surface")) return surface;
+    return std::nullopt;
+  }
+
+  std::optional<std::size_t> find_material(const Body& body) {
+    const std::optional<std::size_t> surface = find_surface(body);
+    return surface ? gltf::find_index(surfaces_[*surface], "material", materials_.size(), "acoustic material") : std::nullopt;
+  }
+
+  std::optional<std::size_t> find_physics_material(const Body& body) {
+    for (const std::size_t n : body.colliders) {
+      base::Object collider = physics_[n]->object("collider");
+      if (collider.has("collisionFilter") && !has_filter_warning_) {
+        warn(n, "collision filters are left out: all bodies collide");
+        has_filter_warning_ = true;
+      }
+      if (const auto index = gltf::find_index(collider, "physicsMaterial", physics_materials_.size(), "physics material")) return index;
+    }
+    return std::nullopt;
+  }
+
+  double read_roughness(std::size_t surface) {
+    base::Object& own = surfaces_[surface];
+    const double roughness = own.number_or("roughness", kDefaultRoughnessM);
+    if (!(roughness >= 0.0)) own.fail("roughness", fmt::format("is {:g} m; it must not be negative", roughness));
+    return std::min(roughness, kRoughM);
+  }
+
+  void read_contact(Body& body) {
+    if (const auto surface = find_surface(body)) body.entry.set("roughness_m", read_roughness(*surface));
+    read_physics_material(body);
+  }
+
+  void read_physics_material(Body& body) {
+    const std::optional<std::size_t> index = find_physics_material(body);
+    if (!index) return;
+    base::Object& material = physics_materials_[*index];
+    const auto read = [&](const char* key, double fallback, const char* mode_key) {
+      const double value = material.number_or(key, fallback);
+      if (!(value >= 0.0)) material.fail(key, fmt::format("is {:g}; it must not be negative", value));
+      return Contact{value, material.choice_or(mode_key, {"average", "minimum", "maximum", "multiply"}, "average")};
+    };
+    body.restitution = read("restitution", kDefaultRestitution, "restitutionCombine");
+    body.friction = read("dynamicFriction", kDefaultFriction, "frictionCombine");
+  }
+
+  /// The value of each kind of body, so that the geometric mean of two, as scenes combine, is the value that the extension combines. With
+  /// one kind of moving bodies this has a solution; else the values themselves, with a warning.
+  void settle(const char* key, std::optional<Contact> Body::*member, double limit) {
+    std::map<Contact, int> moving, fixed;
+    for (const Body& body : bodies_)
+      if ((body.is_in_ground || !body.entry.is_null()) && body.*member) ++(body.is_fixed ? fixed : moving)[*(body.*member)];
+    std::map<std::pair<bool, Contact>, double> values;  // by is_fixed
+    for (const auto& [contact, count] : moving) values[{false, contact}] = contact.value;
+    for (const auto& [contact, count] : fixed) values[{true, contact}] = contact.value;
+    if (moving.size() == 1) {
+      const auto& [own, count] = *moving.begin();
+      double& mine = values[{false, own}];
+      if (count > 1) mine = combine(own, own);
+      if (count == 1 && fixed.size() == 1) mine = combine(own, fixed.begin()->first);
+      for (const auto& [other, number] : fixed)
+        if (const double wanted = combine(own, other); mine > 0.0) values[{true, other}] = wanted * wanted / mine;
+    }
+    for (auto& [of, value] : values) value = std::clamp(value, 0.0, limit);
+    const auto check = [&](bool is_fixed, const Contact& a, const Contact& b) {
+      const double taken = std::sqrt(values[{false, a}] * values[{is_fixed, b}]), wanted = combine(a, b);
+      if (std::abs(taken - wanted) <= 0.005) return;
+      const std::string text =
+          fmt::format("the {} of two bodies is the geometric mean of both: {:.3g} where \"{}\" of {:g} and {:g} is {:.3g}", key, taken,
+                      std::min(a.mode, b.mode), a.value, b.value, wanted);
+      if (std::find(made_.warnings.begin(), made_.warnings.end(), text) == made_.warnings.end()) made_.warnings.push_back(text);
+    };
+    for (const auto& [a, count] : moving) {
+      for (const auto& [b, number] : moving)
+        if (a < b || (a == b && count > 1)) check(false, a, b);
+      for (const auto& [b, number] : fixed) check(true, a, b);
+    }
+    for (Body& body : bodies_)
+      if (body.*member) {
+        const double value = values[{body.is_fixed, *(body.*member)}];
+        if (body.is_in_ground)
+          ground_.set(key, value);
+        else if (!body.entry.is_null())
+          body.entry.set(key, value);
+      }
+  }
+
+  // ---- ground ----
+
+  std::optional<Slab> find_slab(std::size_t b) {
+    Body& body = bodies_[b];
+    if (body.model || body.motion || body.colliders.size() != 1) return std::nullopt;
+    const std::size_t n = body.colliders.front();
+    base::Object geometry = open_geometry(n);
+    const auto index = gltf::find_index(geometry, "shape", shapes_.size(), "shape");
+    if (!index || shapes_[*index].string("type") != "box") return std::nullopt;
+    const Surface box = read_shape(n);
+    const gltf::Matrix& matrix = graph_.global[n];
+    const Eigen::Vector3d half = 2.0 * to_eigen(box.vertices_m.back());
+    int upright = 0;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d side = raise(get_linear(matrix).col(k) * half[k]);
+      const bool is_upright = std::hypot(side[0], side[1]) <= kLevel * std::abs(side[2]);
+      if (!is_upright && !(std::abs(side[2]) <= kLevel * side.norm())) return std::nullopt;
+      upright += static_cast<int>(is_upright);
+    }
+    if (upright != 1) return std::nullopt;
+    constexpr double kFar = std::numeric_limits<double>::infinity();
+    Slab slab{.body = b, .top_m = -kFar, .low = {kFar, kFar}, .high = {-kFar, -kFar}};
+    for (const Vec3& v : box.vertices_m) {
+      const Eigen::Vector3d corner = raise(get_linear(matrix) * to_eigen(v) + get_place(matrix));
+      slab.top_m = std::max(slab.top_m, corner[2]);
+      for (int k = 0; k < 2; ++k) {
+        slab.low[k] = std::min(slab.low[k], corner[k]);
+        slab.high[k] = std::max(slab.high[k], corner[k]);
+      }
+    }
+    return slab;
+  }
+
+  /// The lowest level of static boxes, if it is of one kind, nothing moving is below and something is above it.
+  void find_ground() {
+    std::vector<Slab> slabs;
+    for (std::size_t b = 0; b < bodies_.size(); ++b)
+      if (const std::optional<Slab> slab = find_slab(b)) slabs.push_back(*slab);
+    if (slabs.empty()) return;
+    double top = std::numeric_limits<double>::infinity();
+    for (const Slab& slab : slabs) top = std::min(top, slab.top_m);
+    std::erase_if(slabs, [&](const Slab& slab) { return slab.top_m > top + kLevel; });
+    const auto get_kind = [&](const Slab& slab) {
+      const Body& body = bodies_[slab.body];
+      return std::pair(find_physics_material(body), find_surface(body));
+    };
+    bool is_above = false;
+    for (const Slab& slab : slabs)
+      if (get_kind(slab) != get_kind(slabs.front())) return;
+    for (const Body& body : bodies_) {
+      if (body.is_fixed || body.entry.is_null()) continue;
+      if (body.place[2] < top) return;
+      for (const Slab& slab : slabs)
+        is_above = is_above || (body.place[0] >= slab.low[0] && body.place[0] <= slab.high[0] && body.place[1] >= slab.low[1] &&
+                                body.place[1] <= slab.high[1]);
+    }
+    if (!is_above) return;
+    ground_ = base::Json::object().set("height_m", top + 0.0);
+    for (const Slab& slab : slabs) {
+      bodies_[slab.body].is_in_ground = true;
+      read_physics_material(bodies_[slab.body]);
+    }
+    Body& first = bodies_[slabs.front().body];
+    if (const auto material = find_material(first)) {
+      base::Object& own = materials_[*material];
+      if (own.has("youngsModulus")) ground_.set("young_modulus_pa", read_positive(own, "youngsModulus", 0.0, 100.0, 1e13));
+      if (own.has("poissonRatio")) ground_.set("poisson_ratio", own.number("poissonRatio", {-1.0, 0.5}));
+      if (own.has("density")) ground_.set("density_kg_m3", read_positive(own, "density", 0.0, 1.0, 3e4));
+    }
+    if (const auto surface = find_surface(first)) ground_.set("roughness_m", read_roughness(*surface));
+  }
+
+  // ---- scene file ----
+
+  void write_scene() {
+    made_.scene = base::Json::object();
+    made_.scene.set("duration_s", kSceneSeconds);
+    if (!ground_.is_null()) made_.scene.set("ground", ground_);
+    if (camera_) {
+      const gltf::Matrix& matrix = graph_.global[*camera_];
+      const Eigen::Vector3d place = raise(get_place(matrix));
+      if (!(place.cwiseAbs().maxCoeff() <= kFarM))
+        graph_.nodes[*camera_].fail("camera", fmt::format("is more than {:g} m from the origin", kFarM));
+      const Eigen::Vector3d facing = raise(-get_linear(matrix).col(2));
+      base::Json listener = base::Json::object().set("position_m", make_list(place));
+      if (facing.norm() > 0.0) listener.set("facing", make_list(facing.normalized()));
+      made_.scene.set("listener", listener);
+    }
+    base::Json list = base::Json::array();
+    for (const Body& body : bodies_) {
+      if (body.entry.is_null() || body.name.empty()) continue;
+      base::Json entry = base::Json::object().set("name", body.name);
+      for (const char* key : {"bank", "fixed", "position_m", "quaternion", "velocity_m_s", "angular_velocity_rad_s", "restitution",
+                              "friction", "roughness_m", "gain", "effects"})
+        if (body.entry.has(key)) entry.set(key, body.entry[key]);
+      list.add(entry);
+    }
+    if (list.empty()) throw InputError(fmt::format("{}: its scene has a ground and no other body; add one", file_.name()));
+    made_.scene.set("bodies", list);
+  }
+
+  gltf::File file_;
+  const GlbReading* reading_;
+  const Sink* sink_;
+  base::Object root_;
+  gltf::Graph graph_;
+  std::vector<base::Object> models_, materials_, surfaces_, physics_materials_, shapes_, meshes_;
+  std::vector<std::optional<base::Object>> audio_, physics_;  // by node
+  std::vector<Body> bodies_;
+  std::map<std::string, KnownBank> banks_;  // by all that they are made of
+  std::set<std::string> names_, files_;
+  std::optional<std::size_t> camera_;
+  bool has_filter_warning_ = false;
+  base::Json ground_;
+  GltfScene made_;
+};
+
+}  // namespace
+
+GltfScene read_gltf_scene(std::string_view bytes, const std::string& name, const GlbReading& reading,
+                          const std::function<void(const std::string& file, const bank::Bank& bank)>& sink) {
+  return SceneReader(bytes, name, reading, sink).read();
+}
+
+bool is_gltf(const std::filesystem::path& file) {
+  const std::string ending = base::find_extension(file);
+  return ending == ".gltf" || ending == ".glb";
+}
+
+GltfScene write_gltf_scene(const std::filesystem::path& file, const GlbReading& reading, const std::filesystem::path& folder) {
+  const std::string bytes = base::read_file(file, "glTF scene", kMaxSceneBytes);
+  GltfScene made = read_gltf_scene(bytes, file.string(), reading,
+                                   [&](const std::string& name, const bank::Bank& bank) { bank::write_bank(bank, folder / name); });
+  base::write_file(folder / kSceneFile, made.scene.text());
+  return made;
+}
+
+}  // namespace carillon::exchange
