@@ -248,6 +248,7 @@ std::vector<Check> check_proof(const Bank& bank) {
 std::string describe_completeness(const Bank& bank) {
   const auto modes = bank.mode_count();
   const auto [low, high] = bank.band_hz;
+  if (!bank.proof && modes == 0 && !bank.complete) return "none: a body without modes, which collides and does not vibrate";
   if (!bank.proof)
     return fmt::format("none: {}", bank.complete ? fmt::format("nothing shows that the band holds no more than these {} modes", modes)
                                                  : fmt::format("{} modes of the band were kept, not all", modes));
@@ -270,6 +271,7 @@ std::string describe_accuracy(const Bank& bank) {
                ? std::string(unknown)
                : fmt::format("{} {:.2g} cent ({})", known, *std::max_element(cents.begin(), cents.end()), kind);
   };
+  if (bank.mode_count() == 0 && !bank.proof && !bank.complete) return "there are no frequencies";
   if (bank.element == "imported") return "unknown: the frequencies are those of another program";
   if (bank.element == "analytic") {
     const std::vector<double>& cents = bank.discretisation_error_cents;

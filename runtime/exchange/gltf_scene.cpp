@@ -281,7 +281,7 @@ class SceneReader {
     Placement placement = read_placement(body, linear, place, rotation);
     placement.scale = scale;
     std::string key = fmt::format("model {} {}", *body.model, scale);
-    if (placement.mass_kg) key += fmt::format(" m {}", *placement.mass_kg);
+    if (placement.mass_kg) key += fmt::format(" m {:.11e}", *placement.mass_kg);
     if (placement.centre_m)
       key += fmt::format(" c {:.9e} {:.9e} {:.9e}", (*placement.centre_m)[0], (*placement.centre_m)[1], (*placement.centre_m)[2]);
     if (placement.inertia_kg_m2)
@@ -355,7 +355,7 @@ class SceneReader {
       warn(n, fmt::format("its motion has no mass; {:g} kg/m^3 are taken", silent.density_kg_m3));
     silent.origin = fmt::format("{}, node {}", file_.name(), n);
     std::string key = fmt::format("silent {} {} {}", silent.young_modulus_pa, silent.poisson_ratio, silent.density_kg_m3);
-    if (silent.mass_kg) key += fmt::format(" m {}", *silent.mass_kg);
+    if (silent.mass_kg) key += fmt::format(" m {:.11e}", *silent.mass_kg);
     if (silent.centre_m) key += fmt::format(" c {:.9e} {:.9e} {:.9e}", (*silent.centre_m)[0], (*silent.centre_m)[1], (*silent.centre_m)[2]);
     if (silent.inertia_kg_m2)
       for (const double x : *silent.inertia_kg_m2) key += fmt::format(" {:.9e}", x);
@@ -558,7 +558,14 @@ class SceneReader {
     std::map<std::pair<bool, Contact>, double> values;  // by is_fixed
     for (const auto& [contact, count] : moving) values[{false, contact}] = contact.value;
     for (const auto& [contact, count] : fixed) values[{true, contact}] = contact.value;
-    if (moving.size() == 1) {
+    // Values that agree as they are stay as they are.
+    const auto agrees = [&](const Contact& a, const Contact& b) { return std::abs(std::sqrt(a.value * b.value) - combine(a, b)) <= 1e-9; };
+    bool is_settled = true;
+    for (const auto& [a, count] : moving) {
+      for (const auto& [b, number] : moving) is_settled = is_settled && ((a == b && count == 1) || agrees(a, b));
+      for (const auto& [b, number] : fixed) is_settled = is_settled && agrees(a, b);
+    }
+    if (!is_settled && moving.size() == 1) {
       const auto& [own, count] = *moving.begin();
       double& mine = values[{false, own}];
       if (count > 1) mine = combine(own, own);

@@ -150,6 +150,10 @@ std::string File::read_uri(base::Object& buffer) const {
   std::error_code error;
   if (!std::filesystem::exists(place, error))
     buffer.fail("uri", fmt::format("{}: there is no such file; put it there, or export a single .glb file", place.string()));
+  const std::filesystem::path folder = std::filesystem::canonical(std::filesystem::absolute(name_).parent_path(), error);
+  const std::filesystem::path real = std::filesystem::canonical(place, error);
+  if (error || std::mismatch(folder.begin(), folder.end(), real.begin(), real.end()).first != folder.end())
+    buffer.fail("uri", "is a link out of the folder; put the file itself there");
   return base::read_file(place, "buffer of a glTF file", kMaxBufferBytes);
 }
 
