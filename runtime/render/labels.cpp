@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <tuple>
 #include <utility>
 
 #include "runtime/base/json.hpp"
@@ -88,10 +89,11 @@ class Collector {
   }
   void take(const events::Force& force) {
     const events::Impulse part = events::to_impulse(force);
-    const auto open = pulses_.find(force.body);
+    const Place place{force.body, force.other, force.triangle, force.barycentric};
+    const auto open = pulses_.find(place);
     const double size = norm(part.impulse_n_s), end_s = force.time_s + force.calc_length_s();
     if (!force.continues || open == pulses_.end()) {
-      pulses_[force.body] = hits.size();
+      pulses_[place] = hits.size();
       hits.push_back({part, force.time_s, end_s, size * part.time_s, size});
       return;
     }
@@ -123,8 +125,9 @@ class Collector {
 
  private:
   double duration_s_;
-  std::map<std::int32_t, std::size_t> pulses_;  // last pulse in pieces, by body
-  std::map<std::uint64_t, std::size_t> open_;   // last interval, by id
+  using Place = std::tuple<std::int32_t, std::int32_t, std::int32_t, Vec3>;  // of a force: both bodies, triangle, barycentric
+  std::map<Place, std::size_t> pulses_;        // last pulse in pieces: those of simultaneous pulses on a body alternate
+  std::map<std::uint64_t, std::size_t> open_;  // last interval, by id
 };
 
 void put(Filler& hit, const Hit& at, const Vec3& point_m, double effective_mass_kg, int rate_hz) {

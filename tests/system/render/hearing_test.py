@@ -101,6 +101,20 @@ class HearingTest(unittest.TestCase):
         self.assertEqual({touch["id"] for touch in touches}, set(labels["contact.id"].tolist()))
         self.assertEqual(len([line for line in recorded if "motion" in line]), len(labels["pose.time_s"]))
 
+    def test_simultaneous_pulses_in_pieces_stay_apart(self):
+        lines = [{"carillon_contacts": 1, "bodies": [{"name": "cube", "triangles": 12}, {"name": "gong", "triangles": 12}]}]
+        for piece in range(3):
+            for triangle in (2, 4):  # as an impact at two points is recorded
+                force = {"time_s": 0.2 + piece * 1e-3, "step_s": 1e-3, "body": 1, "other": -1, "triangle": triangle}
+                force |= {"barycentric": [1, 0, 0], "impulse_n_s": [[0, 0, -1e-3 * triangle]], "continues": piece > 0}
+                lines.append({"force": force})
+        (self.root / "pieces.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+        self.render(self.write(strikes=[]), "-o", "p.wav", "--labels", "p.npz", "--contacts", "pieces.jsonl")
+        labels = numpy.load(self.root / "p.npz")
+        self.assertEqual(labels["hit.triangle"].tolist(), [2, 4])
+        numpy.testing.assert_allclose(labels["hit.impulse_n_s"][:, 2], [-6e-3, -12e-3], rtol=1e-6)
+        numpy.testing.assert_allclose(labels["hit.time_s"], [0.2015, 0.2015], rtol=1e-6)
+
     def test_labels_are_of_newton_and_of_the_modes(self):
         self.render(self.write(), "-o", "c.wav", "--labels", "c.npz")
         labels = numpy.load(self.root / "c.npz")
