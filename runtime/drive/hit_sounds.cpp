@@ -100,6 +100,7 @@ bool HitSounds::Contact::needs_modes() const {
 
 void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, LastingContacts& lasting, TouchesCounters& counters,
                     std::vector<events::Event>& events) {
+  limit_predicted(step, hits);
   const auto name = [&](int body) { return step.scene.get_matter(body).name_hash; };
   std::stable_sort(hits.begin(), hits.end(), [&](const FinishedHit& x, const FinishedHit& y) {
     if (x.is_shared != y.is_shared) return y.is_shared;  // impacts may include shared ones
@@ -303,17 +304,17 @@ double HitSounds::keep_ringing(std::span<const int> bodies, const impact::Impact
   return scale;
 }
 
-/// Sum of the normal impulses after which rigid bodies part at all contacts with their restitution [N s]. Projected Gauss-Seidel.
-double HitSounds::calc_rigid_push(const StepView& step, std::span<const Contact> contacts) {
+/// Normal impulses after which rigid bodies part at all contacts with their restitution [N s]. Projected Gauss-Seidel.
+std::vector<double> HitSounds::calc_rigid_pushes(const StepView& step, std::span<const FinishedHit* const> hits) {
   constexpr int kSweeps = 20;
-  // Of a contact: levers and spins per impulse of sides a and b; inverse effective mass.
+  // Of a hit: levers and spins per impulse of sides a and b; inverse effective mass.
   struct Row {
     std::array<Vec3, 2> turning{}, spinning{};
     double inverse_mass = 0.0;
   };
-  std::vector<Row> rows(contacts.size());
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const FinishedHit& hit = contacts[i].hit;
+  std::vector<Row> rows(hits.size());
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    const FinishedHit& hit = *hits[i];
     for (const std::size_t side : {0, 1}) {
       const int body = side == 0 ? hit.a : hit.b;
       if (!step.moves(body)) continue;
@@ -323,11 +324,11 @@ double HitSounds::calc_rigid_push(const StepView& step, std::span<const Contact>
       rows[i].inverse_mass += 1.0 / step.scene.bodies[body].mass_kg + dot(rows[i].turning[side], rows[i].spinning[side]);
     }
   }
-  std::vector<double> pushes(contacts.size(), 0.0);
+  std::vector<double> pushes(hits.size(), 0.0);
   std::array<Vec3, 2> linear{}, angular{};  // changes of the velocities of a and b
-  for (int sweep = 0; sweep < (contacts.size() > 1 ? kSweeps : 1); ++sweep) {
-    for (std::size_t i = 0; i < contacts.size(); ++i) {
-      const FinishedHit& hit = contacts[i].hit;
+  for (int sweep = 0; sweep < (hits.size() > 1 ? kSweeps : 1); ++sweep) {
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      const FinishedHit& hit = *hits[i];
       const double e = step.calc_restitution(hit.a, hit.b);
       double missing = (1.0 + e) * std::max(0.0, hit.approach_m_s);
       const Row& row = rows[i];
@@ -343,7 +344,29 @@ double HitSounds::calc_rigid_push(const StepView& step, std::span<const Contact>
       }
     }
   }
-  return std::accumulate(pushes.begin(), pushes.end(), 0.0);
+  return pushes;
+}
+
+/// Predicted impulses are of single points. Those of two bodies in a step share their motion: at most the impulses of rigid bodies that are
+/// struck there together.
+void HitSounds::limit_predicted(const StepView& step, std::vector<FinishedHit>& hits) {
+  for (std::size_t first = 0; first < hits.size(); ++first) {
+    std::vector<FinishedHit*> together;
+    bool is_limited = false;
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      if (!hits[i].is_predicted || hits[i].a != hits[first].a || hits[i].b != hits[first].b) continue;
+      is_limited = is_limited || i < first;
+      together.push_back(&hits[i]);
+    }
+    if (is_limited || together.size() < 2) continue;
+    const std::vector<double> pushes = calc_rigid_pushes(step, std::vector<const FinishedHit*>(together.begin(), together.end()));
+    for (std::size_t i = 0; i < together.size(); ++i) {
+      FinishedHit& hit = *together[i];
+      const double share = std::min(1.0, pushes[i] / hit.push_n_s);
+      hit.push_n_s *= share;
+      for (Vec3& impulse : hit.impulses_n_s) impulse = share * impulse;
+    }
+  }
 }
 
 /// False if it cannot be integrated: nothing is appended. As in our own contact, supported bodies are struck together with their supports.
@@ -411,9 +434,10 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits
   }
   const std::vector<impact::Pulse> pulses = impact->take_pulses();
   if (pulses.empty()) return false;
-  // Predicted impulses are of single points; the integrated impact has all points, so they set no limit.
-  if (first.is_predicted) most_j = std::numeric_limits<double>::max();
-  const double rigid = first.is_predicted ? 0.0 : calc_rigid_push(step, hits);
+  std::vector<const FinishedHit*> struck;
+  for (const Contact& c : hits) struck.push_back(&c.hit);
+  const std::vector<double> pushes = calc_rigid_pushes(step, struck);
+  const double rigid = std::accumulate(pushes.begin(), pushes.end(), 0.0);
   const double largest = rigid > 0.0 ? std::min(1.0, wanted / rigid) : 1.0;
   const double scale = keep_ringing(names, *impact, bodies, touch_s, largest, most_j);
   if (scale < largest) ++counters.limited;
