@@ -39,13 +39,14 @@ bool is_positive(double x) { return x > 0.0 && std::isfinite(x); }
 void check_options(const TouchesOptions& o) {
   require(o.max_points >= 1 && o.max_points <= 1 << 24, "max_points: give 1 to 16,777,216");
   require(o.max_impacts >= 0, "max_impacts: give 0 or more");
-  require(is_sane(o.gravity_m_s2), "gravity_m_s2 is not finite");
+  require(is_sane(o.gravity_m_s2), "gravity_m_s2: give finite numbers of at most 1e9");
   require(o.slowest_m_s >= 0.0 && std::isfinite(o.slowest_m_s), "slowest_m_s: give 0 or more");
   require(is_positive(o.longest_hit_s), "longest_hit_s: give more than 0");
-  require(is_positive(o.ground_young_pa) && is_positive(o.ground_density_kg_m3) && o.ground_poisson > -1.0 && o.ground_poisson < 0.5,
-          "the ground needs a modulus and a density above 0, and a Poisson's ratio below 0.5");
-  require(o.ground_restitution >= 0.0 && o.ground_restitution <= 1.0 && o.ground_friction >= 0.0 && std::isfinite(o.ground_friction),
-          "the ground needs a restitution of 0 to 1, and a friction of 0 or more");
+  require(is_positive(o.ground_young_pa), "ground_young_pa: give more than 0");
+  require(is_positive(o.ground_density_kg_m3), "ground_density_kg_m3: give more than 0");
+  require(o.ground_poisson > -1.0 && o.ground_poisson < 0.5, "ground_poisson: give more than -1 and less than 0.5");
+  require(o.ground_restitution >= 0.0 && o.ground_restitution <= 1.0, "ground_restitution: give 0 to 1");
+  require(o.ground_friction >= 0.0 && std::isfinite(o.ground_friction), "ground_friction: give 0 or more");
 }
 
 /// Zeros become the values of the bank.
@@ -74,17 +75,19 @@ TouchesBody complete(TouchesBody body, const geometry::Shape* shape) {
 
 void check_body(const TouchesBody& b) {
   require(b.body >= -1, "body: give its number in the synthesiser, or -1 for a silent body");
-  require(b.bank != nullptr || b.body < 0, "a body that sounds needs a bank");
-  require(is_positive(b.young_pa) && is_positive(b.density_kg_m3) && b.poisson > -1.0 && b.poisson <= 0.5,
-          "a body needs a modulus and a density above 0, and a Poisson's ratio of at most 0.5, of its own or of its bank");
-  require(is_positive(b.size_m), "a body needs a size above 0, of its own or of its bank");
+  require(b.bank != nullptr || b.body < 0, "bank: a body that sounds needs one; only silent bodies, whose body is -1, have none");
+  const std::string of_bank = b.bank != nullptr ? ", or 0 for that of the bank" : "; the body has no bank to take it from";
+  require(is_positive(b.young_pa), "young_pa: give more than 0" + of_bank);
+  require(is_positive(b.density_kg_m3), "density_kg_m3: give more than 0" + of_bank);
+  require(b.poisson > -1.0 && b.poisson <= 0.5, "poisson: give more than -1 and at most 0.5");
+  require(is_positive(b.size_m), "size_m: give more than 0" + of_bank);
   require(b.restitution >= 0.0 && b.restitution <= 1.0, "restitution: give 0 to 1");
   require(b.friction >= 0.0 && std::isfinite(b.friction), "friction: give 0 or more");
   if (b.fixed) return;
-  require(is_positive(b.mass_kg), "a body that moves needs a mass above 0, of its own or of its bank");
+  require(is_positive(b.mass_kg), "mass_kg: a body that moves needs more than 0" + of_bank);
   const Mat3 inertia = make_matrix(b.inertia_kg_m2);
   const bool is_set = is_sane(inertia[0]) && is_sane(inertia[1]) && is_sane(inertia[2]);
-  require(is_set && is_positive_definite(inertia), "a body that moves needs a positive definite inertia, of its own or of its bank");
+  require(is_set && is_positive_definite(inertia), "inertia_kg_m2: a body that moves needs a positive definite matrix" + of_bank);
 }
 
 void check_pose(const TouchesPose& pose, std::size_t index) {
@@ -139,10 +142,11 @@ class Touches::Course {
   LastingContacts lasting_;
   TouchesCounters counters_;
   std::deque<events::Event> waiting_;  // not taken by the sink yet
-  double moved_s_ = 0.0;               // time of the last motions
-  std::vector<char> stirred_;          // 1: moved since its last motion event, 2: reported with this step
-  double last_mark_s_ = 0.0;           // queued
-  std::atomic<double> mark_s_{0.0};    // passed to the sink
+  bool is_started_ = false;
+  double moved_s_ = 0.0;             // time of the last motions
+  std::vector<char> stirred_;        // 1: moved since its last motion event, 2: reported with this step
+  double last_mark_s_ = 0.0;         // queued
+  std::atomic<double> mark_s_{0.0};  // passed to the sink
   // Of the current step:
   std::vector<StepPoint> points_;
   std::vector<FinishedHit> hits_;
@@ -212,8 +216,9 @@ void Touches::Course::check_poses(std::span<const TouchesPose> poses) const {
 }
 
 void Touches::Course::start(double time_s, std::span<const TouchesPose> poses) {
-  require(std::isfinite(time_s), "time_s is not finite");
+  require(is_sane(time_s), "time_s is not finite, or above 1e9 s");
   check_poses(poses);
+  is_started_ = true;
   scene_.time_s = scene_.before_s = time_s;
   events_.clear();
   take_poses(poses);
@@ -249,7 +254,8 @@ void Touches::Course::take_poses(std::span<const TouchesPose> poses) {
 }
 
 bool Touches::Course::step(double time_s, std::span<const TouchesPose> poses, std::span<const TouchPoint> points) {
-  require(std::isfinite(time_s), "time_s is not finite");
+  require(is_started_, "no start: give time and poses before the first step to start()");
+  require(is_sane(time_s), "time_s is not finite, or above 1e9 s");
   require(time_s > scene_.time_s, "time_s must be later than that of the last step");
   check_poses(poses);
   scene_.before_s = std::exchange(scene_.time_s, time_s);
@@ -312,8 +318,9 @@ void Touches::Course::take_points(const StepView& view, std::span<const TouchPoi
 bool Touches::Course::take_point(const StepView& view, const TouchPoint& given) {
   const auto is_body = [&](int body) { return body >= 0 && body < count() && bodies_[body].is_used; };
   if (!is_body(given.a) || (given.b != -1 && !is_body(given.b)) || given.a == given.b) return false;
-  if (!is_sane(given.point_m) || !is_sane(given.normal) || !is_sane(given.gap_m) || given.impulse_n_s > kMost ||
-      given.curvature_per_m > kMost)
+  const auto is_usable = [](double x) { return std::isnan(x) || is_sane(x); };
+  if (!is_sane(given.point_m) || !is_sane(given.normal) || !is_sane(given.gap_m) || !is_usable(given.impulse_n_s) ||
+      !is_usable(given.curvature_per_m))
     return false;
   const double length = norm(given.normal);
   if (std::abs(length - 1.0) > kNormalTolerance || (!is_nan(given.friction_n_s) && !is_sane(given.friction_n_s))) return false;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -181,7 +182,11 @@ drive::TouchPoint to_point(const carillon_point& given) {
 struct carillon_touches {
   carillon_touches(const drive::TouchesOptions& options, drive::Touches::Sink sink) : touches(options, std::move(sink)) {}
 
+  /// The array may be shorter than its count says, so a wrong count is refused before it is read.
   void set_poses(const carillon_pose* given, int32_t bodies) {
+    if (bodies != touches.count())
+      throw InputError("bodies is " + std::to_string(bodies) + "; give " + std::to_string(touches.count()) +
+                       " poses, one for each index of carillon_touches_add");
     poses.clear();
     for (int32_t i = 0; i < bodies; ++i) poses.push_back(to_pose(given[i]));
   }
@@ -239,6 +244,7 @@ carillon_status carillon_touches_step(carillon_touches* touches, double time_s, 
     return refuse("carillon_touches_step: touches, poses and points must not be NULL", message, message_size);
   bool has_room = true;
   const carillon_status status = run(message, message_size, [&] {
+    if (count < 0) throw InputError("count is " + std::to_string(count) + "; give the number of points, 0 or more");
     touches->set_poses(poses, bodies);
     touches->points.clear();
     for (int32_t i = 0; i < count; ++i) touches->points.push_back(to_point(points[i]));

@@ -183,9 +183,37 @@ TEST(CTouches, WrongCallsAreRefused) {
   EXPECT_EQ(carillon_touches_remove(fall.touches, 1), CARILLON_OK);
   EXPECT_EQ(carillon_touches_step(nullptr, 0.0, nullptr, 0, nullptr, 0, nullptr, 0), CARILLON_BAD_ARGUMENT);
   EXPECT_EQ(carillon_touches_step(fall.touches, 1.0, nullptr, 2, nullptr, 0, nullptr, 0), CARILLON_BAD_ARGUMENT);
+  EXPECT_EQ(carillon_touches_step(fall.touches, 1.0, &fall.pose, 1, nullptr, 0, message, sizeof message), CARILLON_BAD_INPUT);
+  EXPECT_NE(std::strstr(message, "poses"), nullptr) << message;
   EXPECT_EQ(carillon_touches_get_counters(fall.touches, nullptr), CARILLON_BAD_ARGUMENT);
   EXPECT_EQ(carillon_touches_mark_s(nullptr), 0.0);
   carillon_touches_destroy(nullptr);
+}
+
+/// A wrong count is refused before anything is read, and nothing changes.
+TEST(CTouches, CountsAndOrderAreChecked) {
+  Fall fall;
+  char message[200] = "";
+  EXPECT_EQ(carillon_touches_step(fall.touches, 0.1, &fall.pose, 1, nullptr, 0, message, sizeof message), CARILLON_BAD_INPUT);
+  EXPECT_NE(std::strstr(message, "start"), nullptr) << message;
+  for (const int32_t bodies : {-1, 0, 2, std::numeric_limits<int32_t>::max()}) {
+    EXPECT_EQ(carillon_touches_start(fall.touches, 0.0, &fall.pose, bodies, message, sizeof message), CARILLON_BAD_INPUT) << bodies;
+    EXPECT_NE(std::strstr(message, "give 1 pose"), nullptr) << message;
+  }
+  ASSERT_EQ(fall.start(), CARILLON_OK);
+  for (const int32_t count : {-1, std::numeric_limits<int32_t>::min()}) {
+    EXPECT_EQ(carillon_touches_step(fall.touches, 0.1, &fall.pose, 1, &fall.point, count, message, sizeof message), CARILLON_BAD_INPUT);
+    EXPECT_NE(std::strstr(message, "count"), nullptr) << message;
+  }
+  EXPECT_EQ(fall.step(1e300, 0), CARILLON_BAD_INPUT);
+  EXPECT_EQ(fall.step(0.1, 1), CARILLON_OK);
+  fall.point.impulse_n_s = -HUGE_VAL;
+  EXPECT_EQ(fall.step(0.2, 1), CARILLON_OK);
+  carillon_touches_counters counters;
+  carillon_touches_counters_init(&counters);
+  ASSERT_EQ(carillon_touches_get_counters(fall.touches, &counters), CARILLON_OK);
+  EXPECT_EQ(counters.steps, 2);
+  EXPECT_EQ(counters.bad_points, 1);
 }
 
 /// Any bits in any field: a status, and finite events.
