@@ -21,6 +21,14 @@ namespace {
 
 // A mode is dropped when all sensors read less: 0.1 ug, 1 nm/s, 1 pm, 1e-13.
 constexpr std::array<double, 4> kSilence{1e-6, 1e-9, 1e-12, 1e-13};
+constexpr double kBarycentricSlack = 1e-6;
+
+/// Of any length: its square may overflow or vanish.
+Vec3 calc_direction(const SensorSettings& settings) {
+  const Vec3& given = settings.direction;
+  const double largest = std::max({std::abs(given[0]), std::abs(given[1]), std::abs(given[2])});
+  return calc_unit({given[0] / largest, given[1] / largest, given[2] / largest});
+}
 
 std::complex<double> calc_weight(Quantity quantity, double lambda, double decay) {
   const double omega_d = calc_damped_omega(lambda, decay);
@@ -66,7 +74,7 @@ std::vector<std::pair<std::size_t, double>> find_gauge(const bank::Bank& bank, c
   constexpr double kSameFace = 0.9;  // cosine of the angle between triangles of one face
   const Face own(bank, bank.triangles[settings.triangle]);
   if (!(own.area_m2 > 0.0)) throw InputError("sensor: its triangle has no area; move it");
-  const auto lay = [direction = calc_unit(settings.direction)](const Vec3& normal) { return direction - dot(direction, normal) * normal; };
+  const auto lay = [direction = calc_direction(settings)](const Vec3& normal) { return direction - dot(direction, normal) * normal; };
   if (!(norm(lay(own.normal)) > 1e-3)) throw InputError("sensor: a strain gauge lies in the surface, and its direction is normal to it");
   std::vector<std::pair<std::size_t, double>> weights;
   for (std::size_t corner = 0; corner < 3; ++corner) {
@@ -111,8 +119,14 @@ Sensor::Sensor(const std::shared_ptr<const Model>& model, const bank::Bank& bank
 
 void Sensor::check(const bank::Bank& bank, const SensorSettings& settings) const {
   if (settings.triangle < 0 || settings.triangle >= std::ssize(bank.triangles) || !model_->has_triangle(settings.triangle))
-    throw InputError("sensor: there is no triangle " + std::to_string(settings.triangle));
-  if (!is_finite(settings.barycentric)) throw InputError("sensor: its barycentric coordinates are not finite");
+    throw InputError("sensor: there is no triangle " + std::to_string(settings.triangle) + "; give 0 to " +
+                     std::to_string(bank.triangles.size() - 1));
+  if (bank.triangles != model_->get_surface()->triangles)
+    throw InputError("sensor: the bank has another surface than the model of the body; give the bank that the model was made of");
+  const Vec3& share = settings.barycentric;
+  if (!(std::min({share[0], share[1], share[2]}) >= -kBarycentricSlack &&
+        std::abs(share[0] + share[1] + share[2] - 1.0) <= kBarycentricSlack))
+    throw InputError("sensor: its barycentric coordinates are not 0 to 1 with the sum 1");
   if (!is_finite(settings.direction) || !(calc_length(settings.direction) > 0.0))
     throw InputError("sensor: its direction has no length; give a vector in the axes of the mesh");
   const double rate = settings.rate_hz;
@@ -123,7 +137,7 @@ void Sensor::check(const bank::Bank& bank, const SensorSettings& settings) const
 
 Sensor::Weights Sensor::find_weights(const bank::Bank& bank, const SensorSettings& settings) const {
   if (quantity_ == Quantity::kStrain) return find_gauge(bank, settings);
-  const Vec3 along = calc_unit(settings.direction);
+  const Vec3 along = calc_direction(settings);
   Weights weights;
   for (std::size_t corner = 0; corner < 3; ++corner)
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -172,7 +186,7 @@ void Sensor::add_modes(const Weights& weights) {
 }
 
 void Sensor::add_rigid(const bank::Bank& bank, const SensorSettings& settings) {
-  const RigidAnswer answer(bank.rigid, bank::calc_point(bank, settings.triangle, settings.barycentric), calc_unit(settings.direction));
+  const RigidAnswer answer(bank.rigid, bank::calc_point(bank, settings.triangle, settings.barycentric), calc_direction(settings));
   std::vector<double>& field = quantity_ == Quantity::kAcceleration ? direct_ : rigid_;
   field.resize(3 * bank.vertices_m.size(), 0.0);
   for (std::size_t v = 0; v < bank.vertices_m.size(); ++v) {

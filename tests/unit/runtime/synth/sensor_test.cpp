@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -309,12 +311,22 @@ TEST(Sensor, ItRefusesWhatCannotBeRead) {
   EXPECT_THROW(add(body, {.direction = {}}), InputError);
   EXPECT_THROW(add(body, {.rate_hz = 1.0}), InputError);
   EXPECT_THROW(add(body, {.barycentric = {NAN, 0.0, 0.0}}), InputError);
+  EXPECT_THROW(add(body, {.barycentric = {2.0, -1.0, 0.0}}), InputError) << "outside its triangle";
+  bank::Bank other = bank;
+  other.triangles.front() = {0, 1, std::numeric_limits<std::int32_t>::max() / 4};
+  EXPECT_THROW(synthesiser.add_sensor(body, other, {}), InputError) << "the surface of another bank";
   EXPECT_THROW(add(body, {.triangle = 0, .direction = {0.0, 0.0, 1.0}, .quantity = Quantity::kStrain}), InputError);
   EXPECT_THROW(add(mute, {}), InputError);
   EXPECT_THROW(add(7, {}), InputError);
   EXPECT_NO_THROW(add(body, {.triangle = 0, .direction = {1.0, 0.0, 1.0}, .quantity = Quantity::kStrain}));
   EXPECT_THROW(synthesiser.swap_model(body, model), InputError);
   EXPECT_EQ(synthesiser.find_sensor(1), nullptr);
+}
+
+TEST(Sensor, ADirectionHasAnyLength) {
+  const auto wanted = play(make_bank(), {.direction = {0.0, 0.0, 1.0}}, {make_blow(1e-3)}, 500);
+  for (const double length : {1e-300, 3.0, 1e300})
+    EXPECT_EQ(play(make_bank(), {.direction = {0.0, 0.0, length}}, {make_blow(1e-3)}, 500), wanted) << length;
 }
 
 TEST(Sensor, StrainOfALinearFieldIsItsGradient) {
