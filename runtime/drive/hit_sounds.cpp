@@ -43,6 +43,16 @@ double calc_modal_j(const impact::Modes& modes, const std::vector<double>& shape
   return sum;
 }
 
+/// Moves a modal state by a time of any sign as if it had no damping.
+void turn_undamped(const impact::Modes& modes, std::vector<double>& q, std::vector<double>& q_dot, double time_s) {
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    const double omega = modes.get_omega()[i], c = std::cos(omega * time_s), s = std::sin(omega * time_s);
+    const double before = q[i];
+    q[i] = omega > 0.0 ? c * before + s / omega * q_dot[i] : before + time_s * q_dot[i];
+    q_dot[i] = c * q_dot[i] - omega * s * before;
+  }
+}
+
 std::vector<double> turn_shape(const Mat3& rotation, const std::vector<double>& shape) {
   std::vector<double> turned(shape.size());
   for (std::size_t i = 0; i + 2 < shape.size(); i += 3) {
@@ -218,14 +228,16 @@ double HitSounds::find_rattle_end(const StepView& step, const Contact& c, double
   return time_s + kLongestRattleS * (last < 1.0 ? std::log(first) / std::log(first / last) : 1.0);
 }
 
-/// Modal state at a time.
+/// Modal state at a time. Before that of the last impact: without damping, so that the state after both has the sum of their motions.
 HitSounds::Ringing& HitSounds::find_ringing(const StepView& step, int body, double time_s) {
   Ringing& ringing = ringing_[static_cast<std::size_t>(body)];
   if (ringing.time_s > time_s + kLongestImpactS) ringing = {};  // the time was set back
-  if (time_s > ringing.time_s) {
-    if (!ringing.q.empty()) step.bodies[body].modes->move_freely(ringing.q, ringing.q_dot, time_s - ringing.time_s);
-    ringing.time_s = time_s;
+  if (!ringing.q.empty()) {
+    const impact::Modes& modes = *step.bodies[body].modes;
+    if (time_s > ringing.time_s) modes.move_freely(ringing.q, ringing.q_dot, time_s - ringing.time_s);
+    if (time_s < ringing.time_s) turn_undamped(modes, ringing.q, ringing.q_dot, time_s - ringing.time_s);
   }
+  ringing.time_s = time_s;
   return ringing;
 }
 

@@ -62,6 +62,31 @@ TEST(TouchEnergy, BlowsOnARingingPlateAddNoMoreThanTheirOwn) {
   }
 }
 
+/// Both corners of an edge strike within a step, the second up to 5 ms later: while the impact of the first lasts, and after it.
+TEST(TouchEnergy, HitsOfAStepShareTheMotion) {
+  const double thickness = 1e-3, e = 0.5;
+  const bank::Bank plate = physics::tests::make_plate_bank(0.2, thickness, 8000.0, 8, 1.0);
+  const double moved_kg = 0.25 * plate.rigid.mass_kg, lost_j = 0.5 * moved_kg * (1.0 - e * e);
+  for (const bool early : {false, true}) {
+    for (const double gap : {0.0, 1e-3, 5e-3}) {
+      Rig rig({.early = early, .ground_restitution = e});
+      rig.add(plate, "plate", {0, 0, 0.5 * thickness}, {0, 0, -0.25}, e);
+      rig.poses[0].spin_rad_s[1] = 7.5;  // the motion that a blow on the edge gives: 1 m/s there
+      rig.start();
+      const double half = 0.5 * (1.0 + e) * moved_kg;
+      std::vector<TouchPoint> points{on_ground(0, {0.1, -0.1, 0.0}, half), on_ground(0, {0.1, 0.1, 0.0}, half)};
+      points[1].gap_m = gap;
+      rig.poses[0].velocity_m_s[2] = 0.125;
+      rig.poses[0].spin_rad_s[1] = -3.75;
+      rig.step(1.0 / 60.0, points);
+      rig.step(1.0 / 60.0, {});
+      EXPECT_EQ(rig.touches.get_counters().hits, 2);
+      EXPECT_GT(calc_modal_j(rig, plate, 0), 0.05 * lost_j) << early << " " << gap;
+      EXPECT_LE(calc_modal_j(rig, plate, 0), 1.01 * lost_j) << early << " " << gap;
+    }
+  }
+}
+
 /// A slow hit on a thick plate is a Hertz pulse; on one that a fast one has left ringing, it is integrated.
 TEST(TouchEnergy, SlowHitsOnARingingPlateAreIntegrated) {
   const double thickness = 20e-3;
