@@ -12,8 +12,12 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <exception>
+#include <filesystem>
 #include <map>
 #include <string>
+#include <system_error>
+#include <utility>
 
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
@@ -22,6 +26,8 @@
 
 namespace carillon::render {
 namespace {
+
+namespace fs = std::filesystem;
 
 const base::Keys<ProgramOptions> kRun{{"scene", "required", "scene file; paths are relative to the manifest"},
                                       {"output", "required", "WAV file"},
@@ -63,22 +69,73 @@ int find_code(int status, const std::filesystem::path& scene) {
   return kExitSystem;
 }
 
+/// False also for a scene that cannot be read: its own run says why.
+bool has_sensors(const fs::path& scene) {
+  try {
+    return base::read_document(scene, "").root().has("sensors");
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+/// The files of all runs: those of one must not be written or read by another, as runs come in any order.
+class Files {
+ public:
+  void add_input(const fs::path& file, std::string what) { inputs_.emplace(find_key(file), std::move(what)); }
+  void add_output(const fs::path& file, const std::string& place) {
+    if (!written_.emplace(find_key(file), place).second) fail_twice(file, place);
+  }
+  void check_inputs() const {
+    for (const auto& [file, what] : inputs_)
+      if (const auto found = written_.find(file); found != written_.end())
+        throw InputError(fmt::format("{}: {} is {}; give the output another name", found->second, file.string(), what));
+  }
+  /// Scenes are read only where files of sensors would have the name of another file.
+  void check_sensors(const std::vector<ProgramOptions>& runs, const std::vector<std::string>& places) {
+    std::map<fs::path, int> counts;
+    for (const ProgramOptions& run : runs) ++counts[find_key(find_sensor_file(run.sound))];
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      const fs::path file = find_sensor_file(runs[i].sound), key = find_key(file);
+      if ((counts[key] > 1 || written_.contains(key)) && has_sensors(runs[i].scene)) add_output(file, places[i]);
+    }
+  }
+
+ private:
+  static fs::path find_key(const fs::path& file) {
+    std::error_code error;
+    const fs::path key = fs::weakly_canonical(fs::absolute(file), error);
+    return error ? file.lexically_normal() : key;
+  }
+  [[noreturn]] static void fail_twice(const fs::path& file, const std::string& place) {
+    throw InputError(fmt::format("{}: {} is written twice; give every file a name of its own", place, file.string()));
+  }
+
+  std::map<fs::path, std::string> inputs_, written_;  // what, or where in the manifest
+};
+
 }  // namespace
 
-std::vector<ProgramOptions> read_manifest(const std::filesystem::path& file) {
+std::vector<ProgramOptions> read_manifest(const fs::path& file) {
   const base::Document document = base::read_document(file, "a manifest lists the scenes to render");
   base::Object root = document.root();
   std::vector<ProgramOptions> runs;
-  std::map<std::filesystem::path, std::string> written;
+  std::vector<std::string> places;
+  Files files;
+  files.add_input(file, "the manifest");
   if (root.objects("scenes").empty()) root.fail("scenes", "is missing or empty; list objects with \"scene\" and \"output\"");
   for (base::Object& object : root.objects("scenes")) {
-    const ProgramOptions run = runs.emplace_back(read_run(object));
+    const ProgramOptions& run = runs.emplace_back(read_run(object));
+    places.push_back(object.find_place(""));
     for (const auto& output : {std::optional(run.sound), run.labels, run.record, run.report, run.trajectory, run.spectrogram})
-      if (output && !written.emplace(output->lexically_normal(), object.find_place("")).second)
-        throw InputError(
-            fmt::format("{}: {} is written twice; give every file a name of its own", object.find_place("output"), output->string()));
+      if (output) files.add_output(*output, object.find_place("output"));
   }
   root.finish();
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    files.add_input(runs[i].scene, "the scene of " + places[i]);
+    if (runs[i].contacts) files.add_input(*runs[i].contacts, "the contacts file that is played by " + places[i]);
+  }
+  files.check_inputs();
+  files.check_sensors(runs, places);
   return runs;
 }
 

@@ -108,9 +108,6 @@ class Outputs {
   std::vector<OutputFile> files_;
 };
 
-/// "NAME.sensors.wav" next to the file of the sound.
-fs::path find_sensor_file(const fs::path& sound) { return fs::path(sound).replace_extension(".sensors.wav"); }
-
 bool is_npz(const fs::path& labels) { return base::find_extension(labels) == ".npz"; }
 
 bool is_same_file(const fs::path& a, const fs::path& b) {
@@ -405,6 +402,8 @@ class Run {
 };
 
 }  // namespace
+
+fs::path find_sensor_file(const fs::path& sound) { return fs::path(sound).replace_extension(".sensors.wav"); }
 
 void run(const ProgramOptions& options) {
   Run run(options);

@@ -22,6 +22,9 @@ struct ProgramOptions {
   bool quiet = false;                           // print warnings only
 };
 
+/// "NAME.sensors.wav" next to the file of the sound.
+std::filesystem::path find_sensor_file(const std::filesystem::path& sound);
+
 /// Reads all inputs, simulates, renders and writes all outputs. Notes go to stdout (stderr if the sound goes to stdout), progress and
 /// warnings to stderr. Outputs appear together and complete, or not at all. Memory does not grow with the length of the scene, but for
 /// labels. Throws InputError before any work for an invalid input or an unwritable output.

@@ -150,6 +150,17 @@ class HearingTest(unittest.TestCase):
         runs[1] = {"scene": "good.json", "output": "0.wav"}
         (self.root / "twice.json").write_text(json.dumps({"scenes": runs}))
         self.assertIn("written twice", self.render("twice.json", "--jobs", 1, code=2))
+        (self.root / "here").symlink_to(self.root)
+        for more, words in (
+            ({"output": "here/0.wav"}, "written twice"),
+            ({"output": "0.sensors.wav"}, "0.sensors.wav is written twice"),
+            ({"output": "0.flac"}, "0.sensors.wav is written twice"),
+            ({"output": "0b.wav", "contacts": "0.npz"}, "is the contacts file that is played by files.json"),
+            ({"output": "0b.wav", "report": "good.json"}, "is the scene of files.json"),
+            ({"output": "0b.wav", "report": "files.json"}, "is the manifest"),
+        ):
+            (self.root / "files.json").write_text(json.dumps({"scenes": [runs[0], {"scene": "good.json", **more}]}))
+            self.assertIn(words, self.render("files.json", "--jobs", 2, code=2))
         self.assertIn("--jobs", self.render("manifest.json", "--jobs", 2, "-o", "x.wav", code=2))
         self.assertIn('"scenes": is missing', self.render(self.write("s.json"), "--jobs", 2, code=2))
 
