@@ -25,7 +25,8 @@ double read_number(const std::string& word) {
   double value = 0.0;
   const char* const end = word.data() + word.size();
   const auto [stop, error] = std::from_chars(word.data(), end, value);
-  if (error != std::errc() || stop != end || !std::isfinite(value)) throw InputError(fmt::format("\"{}\" is no number", word));
+  if (error != std::errc() || stop != end || !std::isfinite(value))
+    throw InputError(fmt::format("\"{}\" is no number", base::printable(word)));
   return value;
 }
 
@@ -137,8 +138,9 @@ std::string carry_out(const std::vector<std::string>& words, Hands& hands) {
   if (found == get_commands().end()) {
     std::vector<std::string> known{"quit"};
     for (const auto& [word, command] : get_commands()) known.push_back(word);
+    if (words[0] == "quit") throw InputError("quit has no other words; give it alone");
     const std::string nearest = base::find_nearest(words[0], known);
-    throw InputError(fmt::format("there is no command \"{}\"{}", words[0],
+    throw InputError(fmt::format("there is no command \"{}\"{}", base::printable(words[0]),
                                  nearest.empty() ? "; carillon-live --help lists them" : fmt::format("; did you mean \"{}\"?", nearest)));
   }
   if (hands.world == nullptr) throw InputError("no body of the scene can move");
@@ -164,19 +166,18 @@ std::vector<std::string> LineReader::read() {
   };
   pollfd source{descriptor_, POLLIN, 0};
   std::array<char, 4096> piece;
-  while (is_open_ && poll(&source, 1, 0) > 0) {
-    const ssize_t count = ::read(descriptor_, piece.data(), piece.size());
-    if (count <= 0) {
-      is_open_ = false;
-      if (!begun_.empty()) finish();
-      break;
-    }
-    for (const char c : std::span(piece.data(), static_cast<std::size_t>(count)))
-      if (c == '\n')
-        finish();
-      else if (begun_.size() <= kMaxLine)
-        begun_ += c;
+  if (!is_open_ || poll(&source, 1, 0) <= 0) return lines;
+  const ssize_t count = ::read(descriptor_, piece.data(), piece.size());
+  if (count <= 0) {
+    is_open_ = false;
+    if (!begun_.empty()) finish();
+    return lines;
   }
+  for (const char c : std::span(piece.data(), static_cast<std::size_t>(count)))
+    if (c == '\n')
+      finish();
+    else if (begun_.size() <= kMaxLine)
+      begun_ += c;
   return lines;
 }
 

@@ -33,8 +33,8 @@ std::string carry_out(const std::vector<std::string>& words, Hands& hands);
 class LineReader {
  public:
   explicit LineReader(int descriptor) : descriptor_(descriptor) {}
-  /// The complete lines since the last call; at the end of the input also the last one without an end. Lines of more than 100,000
-  /// characters are cut.
+  /// The complete lines since the last call, of at most 4 KiB of input: a flood does not keep its caller from other work. At the end of
+  /// the input also the last one without an end. Lines of more than 100,000 characters are cut.
   std::vector<std::string> read();
 
  private:

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <optional>
 #include <string>
@@ -56,7 +57,10 @@ class CommandInput {
     return true;
   }
   void print() const {
-    if (port_) fmt::print("OSC                {} commands or packets rejected\n", refused_);
+    if (port_)
+      fmt::print("OSC                {} commands or packets rejected\n", refused_);
+    else if (refused_ > 0)
+      fmt::print("commands           {} rejected\n", refused_);
   }
 
  private:
@@ -84,7 +88,7 @@ class CommandInput {
   Hands hands_;
   std::optional<LineReader> reader_;
   std::optional<OscPort> port_;
-  int refused_ = 0;
+  std::int64_t refused_ = 0;
 };
 
 void print_statistics(const DeviceStatistics& card, const synth::SynthesiserCounters& counters, render::Stage& stage, double rate_hz) {
