@@ -208,24 +208,34 @@ void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
 }
 
 int Synthesiser::add_sensor(int body, const bank::Bank& bank, const SensorSettings& settings) {
+  collect();
   Owned& owned = owned_[check_owned(body)];
   const EffectSet effects = owned.body->get_effects();
   if (!effects.has(Effect::kModal)) throw InputError("a sensor needs the effect \"modal\" of its body");
   if (effects.has(Effect::kNonlinear) && settings.quantity == Quantity::kAcceleration)
     throw InputError("the acceleration of a body with the effect \"nonlinear\" is not known; use its velocity, or leave the effect out");
   if (owned.swap != nullptr || owned.wanted_model != nullptr) throw InputError("add sensors before the model of a body is swapped");
-  if (owned.sensor_count == BodySensors::kMax || sensors_.size() == kMaxSensors)
-    throw InputError("there are too many sensors; a body may have " + std::to_string(BodySensors::kMax));
+  if (owned.sensor_numbers.size() == BodySensors::kMax || (free_sensors_.empty() && sensors_.size() == kMaxSensors))
+    throw InputError("there are too many sensors; a body may have " + std::to_string(BodySensors::kMax) + ", all bodies together " +
+                     std::to_string(kMaxSensors));
   if (commands_->get_room() <= 3 * owned_.size()) throw InputError("too many new sensors wait; process the next frames first");
   auto sensor = std::make_unique<Sensor>(owned.body->get_model(), bank, settings);
   if (owned.sensors == nullptr) owned.sensors = owned.body->make_sensors();
-  sensors_.reserve(kMaxSensors);  // so that find_sensor() needs no lock
+  sensors_.reserve(kMaxSensors);       // so that find_sensor() needs no lock,
+  free_sensors_.reserve(kMaxSensors);  // and that collect() does not allocate
+  owned.sensor_numbers.reserve(BodySensors::kMax);
   commands_->push(
       {.body = owned.body.get(), .sensors = owned.sensors.get(), .sensor = sensor.get(), .number = body, .kind = Command::Kind::kSense});
-  ++owned.sensor_count;
-  sensors_.push_back(std::move(sensor));
-  const auto number = static_cast<int>(sensors_.size()) - 1;
-  sensor_count_.store(number + 1, std::memory_order_release);
+  auto number = static_cast<int>(sensors_.size());
+  if (free_sensors_.empty()) {
+    sensors_.push_back(std::move(sensor));
+    sensor_count_.store(number + 1, std::memory_order_release);
+  } else {
+    number = free_sensors_.back();
+    free_sensors_.pop_back();
+    sensors_[number] = std::move(sensor);
+  }
+  owned.sensor_numbers.push_back(number);
   return number;
 }
 
@@ -262,6 +272,7 @@ void Synthesiser::collect() noexcept {
   while (gone_->pop(command)) {
     Owned& owned = owned_[command.number];
     if (command.kind == Command::Kind::kRemove) {
+      free_sensors_.insert(free_sensors_.end(), owned.sensor_numbers.begin(), owned.sensor_numbers.end());
       owned = Owned{};
       continue;
     }

@@ -121,7 +121,7 @@ class Synthesiser {
   /// Effect::kNonlinear, whose coupling forces it would lack, more than BodySensors::kMax of a body or kMaxSensors, and as Sensor does.
   /// [main-thread]
   int add_sensor(int body, const bank::Bank& bank, const SensorSettings& settings);
-  /// nullptr for a missing number. A sensor and its number outlive its body, until the destructor. [any-thread]
+  /// nullptr for a missing number. A sensor outlives its body until the next add_sensor(), which may take its number. [any-thread]
   Sensor* find_sensor(int sensor) const noexcept {
     return sensor >= 0 && sensor < sensor_count_.load(std::memory_order_acquire) ? sensors_[sensor].get() : nullptr;
   }
@@ -203,7 +203,7 @@ class Synthesiser {
     std::unique_ptr<ModelSwap> swap;            // in progress
     std::shared_ptr<const Model> wanted_model;  // pending; nullptr: none
     std::unique_ptr<BodySensors> sensors;       // nullptr: none
-    std::size_t sensor_count = 0;
+    std::vector<int> sensor_numbers;
     bool is_leaving = false;
   };
   /// Figures of a body for all threads.
@@ -269,6 +269,7 @@ class Synthesiser {
   std::vector<SoundingBody*> directed_;  // bodies with directivity, by number
   std::vector<SoundingBody*> sensed_;    // bodies with sensors, by number
   std::vector<std::unique_ptr<Sensor>> sensors_;
+  std::vector<int> free_sensors_;  // numbers whose body is gone
   std::atomic<int> sensor_count_{0};
   std::atomic<double> allowed_;
   SynthesiserCounters work_;  // audio thread

@@ -444,7 +444,8 @@ typedef struct carillon_sensor {
 CARILLON_API void carillon_sensor_init_sized(carillon_sensor* sensor, size_t size);
 /* [main] Adds a sensor, which reads from the next 128 frames on. `bank`: that of the body's model; not kept. CARILLON_BAD_INPUT for an
  * unknown body or triangle, a body without CARILLON_MODAL, the acceleration of one with CARILLON_NONLINEAR, a direction without length,
- * and a rate out of range. A body with sensors refuses carillon_swap_model. */
+ * and a rate out of range. A body with sensors refuses carillon_swap_model. Sensors end with their body: what is left is to be read
+ * before the next carillon_add_sensor, which may take their numbers. */
 CARILLON_API carillon_status carillon_add_sensor(carillon_synth* synth, const carillon_bank* bank, const carillon_sensor* sensor,
                                                  int32_t* number, char* message, size_t message_size);
 /* [any], one thread per sensor. The next readings in SI units, as many as carillon_process has made; returns their number, 0 for an unknown

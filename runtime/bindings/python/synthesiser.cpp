@@ -247,7 +247,8 @@ void bind_synthesiser(py::module_& module) {
            "A sensor at the point of the surface nearest to a point [m], or in the middle of a triangle, along a direction in the frame of "
            "the mesh; strain: axis of the gauge. quantity: \"acceleration\" [m/s2], \"velocity\" [m/s], \"displacement\" [m] or "
            "\"strain\". rate_hz: of its samples, by default that of the sound. held: the body does not move as a rigid body. buffer_s: "
-           "samples that wait for read_sensor(). Returns its number.")
+           "samples that wait for read_sensor(). Returns its number. A sensor ends with its body: read the rest before the next "
+           "add_sensor(), which may take its number.")
       .def("read_sensor", &Instrument::read_sensor, "sensor"_a,
            "The readings since the last call: (n) float64, SI units. Sample n of a sensor is the reading at sensor_begin_s() + n / "
            "rate_hz, without delay.")

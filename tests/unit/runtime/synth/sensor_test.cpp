@@ -323,6 +323,27 @@ TEST(Sensor, ItRefusesWhatCannotBeRead) {
   EXPECT_EQ(synthesiser.find_sensor(1), nullptr);
 }
 
+TEST(Sensor, NumbersOfRemovedBodiesAreUsedAgain) {
+  const bank::Bank bank = make_bank();
+  Synthesiser synthesiser(SynthesiserOptions{.rate_hz = kRate, .max_bodies = 4});
+  const auto model = Model::make(bank, {.rate_hz = kRate});
+  std::array<float, 512> left, right;
+  const std::array<float*, 2> out{left.data(), right.data()};
+  const int stays = synthesiser.add_sensor(synthesiser.add_body(model), bank, {});
+  for (int round = 0; round < Synthesiser::kMaxSensors + 10; ++round) {
+    const int body = synthesiser.add_body(model), sensor = synthesiser.add_sensor(body, bank, {.buffer_s = 0.0});
+    synthesiser.process(out.data(), 2, 256);
+    EXPECT_NE(sensor, stays);
+    synthesiser.remove_body(body);
+    synthesiser.process(out.data(), 2, 512);
+    synthesiser.collect();
+    std::array<double, 1024> samples;
+    ASSERT_GT(synthesiser.find_sensor(sensor)->read(samples), 200U) << "what is left when its body is gone";
+  }
+  EXPECT_EQ(synthesiser.find_sensor(4), nullptr);
+  EXPECT_GT(synthesiser.find_sensor(stays)->count_ready(), 10000U);
+}
+
 TEST(Sensor, ADirectionHasAnyLength) {
   const auto wanted = play(make_bank(), {.direction = {0.0, 0.0, 1.0}}, {make_blow(1e-3)}, 500);
   for (const double length : {1e-300, 3.0, 1e300})
