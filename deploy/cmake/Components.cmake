@@ -25,10 +25,15 @@ carillon_component(THIN_WALLS "extruded meshes of thin walls" precompute/mesher/
   precompute/mesher/skin_editor.cpp precompute/mesher/skin_editor.hpp precompute/mesher/skin_mitres.cpp)
 carillon_component(ANALYTIC "bodies with known modes" precompute/analytic precompute/run/known_body.cpp)
 carillon_component(PAGE "the web page of carillon explore and its sound engine" jobs/front/explore runtime/bindings/web)
-carillon_component(EXCHANGE "banks as GLB, Faust, SOFA and samples" runtime/exchange/commands.cpp runtime/exchange/from_glb.cpp
-  runtime/exchange/gltf_scene.cpp runtime/exchange/scale_rule.cpp runtime/exchange/silent.cpp runtime/render/gltf_input.cpp
-  runtime/exchange/to_faust.cpp runtime/exchange/to_glb.cpp runtime/exchange/to_sofa.cpp runtime/exchange/struck_point.cpp
-  runtime/exchange/faust.hpp runtime/exchange/glb.hpp runtime/exchange/gltf_scene.hpp runtime/exchange/scale_rule.hpp runtime/exchange/silent.hpp runtime/exchange/sofa.hpp runtime/exchange/struck_point.hpp runtime/render/samples)
+carillon_component(EXCHANGE "banks and modes in formats of other programs, glTF scenes, samples"
+  runtime/exchange/commands.cpp runtime/exchange/faust.hpp runtime/exchange/frf.cpp runtime/exchange/frf.hpp runtime/exchange/from_frd.cpp
+  runtime/exchange/from_glb.cpp runtime/exchange/from_pch.cpp runtime/exchange/from_uff.cpp runtime/exchange/from_unv.cpp
+  runtime/exchange/generalised_mass.cpp runtime/exchange/glb.hpp runtime/exchange/gltf_scene.cpp runtime/exchange/gltf_scene.hpp
+  runtime/exchange/measured.cpp runtime/exchange/measured.hpp runtime/exchange/results_lines.hpp runtime/exchange/scale_rule.cpp
+  runtime/exchange/scale_rule.hpp runtime/exchange/silent.cpp runtime/exchange/silent.hpp runtime/exchange/sofa.hpp
+  runtime/exchange/solid.cpp runtime/exchange/solid.hpp runtime/exchange/solved_model.cpp runtime/exchange/solved_model.hpp
+  runtime/exchange/struck_point.cpp runtime/exchange/struck_point.hpp runtime/exchange/to_faust.cpp runtime/exchange/to_glb.cpp
+  runtime/exchange/to_sofa.cpp runtime/exchange/to_uff.cpp runtime/render/gltf_input.cpp runtime/render/samples)
 carillon_component(SLURM "jobs in Slurm" jobs/queue/slurm jobs/cli/slurm.cpp)
 carillon_component(HEADS "listeners with a head" runtime/acoustics/head runtime/synth/head_ears.cpp)
 carillon_component(STUDIES "advice, scaling studies and bodies matched to recordings: carillon-study, carillon-tune" jobs/study jobs/tune)
