@@ -98,18 +98,6 @@ std::vector<double> calc_cut_scales(const Bank& bank, const std::vector<Cut>& cu
 /// True if the edit changes the ratio of wavelength in air to size.
 bool changes_waves(const Edits& edits) { return edits.density_scale != 1.0 || edits.stiffness_scale != 1.0; }
 
-/// Scales multipoles to size g.
-void scale_size(Multipoles& air, double g) {
-  for (double& x : air.centre_m) x *= g;
-  air.radius_m *= g;
-  air.nearest_m *= g;
-  for (std::size_t m = 0; m < air.order.size(); ++m) {
-    air.freq_hz[m] /= g;
-    air.scale[m] /= std::sqrt(g * g * g);
-    air.decay_per_s[m] /= g;
-  }
-}
-
 /// Bank::regions with scaled volumes.
 std::string scale_volumes(const std::string& regions, double scale) {
   constexpr std::string_view kKey = "\"volume_m3\":";

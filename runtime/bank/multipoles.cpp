@@ -80,6 +80,17 @@ void add_coefficients(Multipoles& multipoles, std::int32_t order, std::span<cons
   }
 }
 
+void scale_size(Multipoles& multipoles, double g) {
+  for (double& x : multipoles.centre_m) x *= g;
+  multipoles.radius_m *= g;
+  multipoles.nearest_m *= g;
+  for (std::size_t m = 0; m < multipoles.order.size(); ++m) {
+    multipoles.freq_hz[m] /= g;
+    multipoles.scale[m] /= std::sqrt(g * g * g);
+    multipoles.decay_per_s[m] /= g;
+  }
+}
+
 namespace {
 
 Mixing select_mixing(const Multipoles& multipoles, const std::vector<std::size_t>& chosen) {

@@ -81,6 +81,9 @@ std::vector<double> calc_far_gains(const Multipoles& multipoles);
 /// InputError for an order out of range, a wrong number of coefficients and non-finite ones.
 void add_coefficients(Multipoles& multipoles, std::int32_t order, std::span<const std::complex<double>> coefficients);
 
+/// Multipoles of the body with all lengths times g > 0: exact.
+void scale_size(Multipoles& multipoles, double g);
+
 /// Multipoles of the modes `chosen`, in that order; empty for none. A mixture loses the parts of unchosen modes and is normalised again to
 /// unit modal mass with the recorded added mass.
 Multipoles select_multipoles(const Multipoles& multipoles, const std::vector<std::size_t>& chosen);

@@ -1,6 +1,6 @@
 // Method: files with Carillon's extras: arrays from the extras, triangles and shapes from the extension, assembled as for a bank file
 //   (bank::assemble_bank); values present in both must agree. Other programs' files: lambda = (2 pi f)^2 + d^2, shapes rounded to 16 bits,
-//   mass properties by the divergence theorem if the model has none.
+//   mass properties by the divergence theorem if the model has none, multipoles if they are in the extension CARILLON_multipoles.
 // Source: KHR_audio_rigid_bodies, draft of 2026 (K. Hiner).
 // Deviations: the node's scale applies to the body, and to modes and mass given for the unscaled body (scale_rule.hpp).
 #include <fmt/format.h>
@@ -13,6 +13,8 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "runtime/bank/corrected.hpp"
@@ -28,6 +30,7 @@
 #include "runtime/base/vector.hpp"
 #include "runtime/exchange/damped.hpp"
 #include "runtime/exchange/glb.hpp"
+#include "runtime/exchange/glb_multipoles.hpp"
 #include "runtime/exchange/gltf/file.hpp"
 #include "runtime/exchange/gltf/nodes.hpp"
 #include "runtime/exchange/scale_rule.hpp"
@@ -77,6 +80,7 @@ class Reader {
     std::vector<base::Object> models = extension_.objects("modalModels");
     base::Object& model = models[number];
     read_model(model);
+    air_ = read_multipoles(file_, model, {model_.freq_hz, model_.decay_per_s, model_.positions.size()});
     std::optional<base::Object> extras = model.object_if("extras");
     std::optional<base::Object> own = extras && !reading_->ignores_extras ? extras->object_if("carillon") : std::nullopt;
     ModelBank made;
@@ -301,6 +305,8 @@ class Reader {
     for (const bank::Check& check : {bank::calc_regions_check(bank), bank::calc_provenance_check(bank)})
       if (!check.faults.empty()) throw InputError(fmt::format("{}: {}: the file {}", file_.name(), check.faults[0], kChanged));
     compare_modes(bank, swinging);
+    if (air_ && !are_multipoles_of(*air_, bank.multipoles, swinging))
+      throw InputError(fmt::format("{}: {} differs from its extras: the file {}", file_.name(), kMultipoles, kChanged));
     return bank;
   }
 
@@ -381,6 +387,20 @@ class Reader {
       warnings_.push_back("its moments of inertia contradict its surface and its mass; those of the surface, filled evenly, are taken");
   }
 
+  /// Multipoles of the modes in the order `order`, of which the decays lose what radiation adds. `size`: of the body relative to the
+  /// multipoles' at the same frequencies; `factor`: of all lengths of the model; `turn`: factor of the shapes.
+  void take_multipoles(const std::vector<std::size_t>& order, double size, double factor, double turn, bank::Bank& bank) const {
+    bank::Multipoles& air = bank.multipoles = bank::select_multipoles(air_->multipoles, order);
+    for (std::size_t m = 0; m < order.size(); ++m) bank.decay_per_s[m] = std::max(0.0, bank.decay_per_s[m] - air.decay_per_s[m]);
+    air.centre_m = size * air.centre_m;
+    air.radius_m *= size;
+    air.nearest_m *= size;
+    bank::scale_size(air, factor);
+    const double other_mass = turn * std::sqrt(std::pow(factor, 3));  // shapes of another mass than that of the model
+    for (double& x : air.scale) x *= other_mass;
+    for (double& x : air.decay_per_s) x *= other_mass * other_mass;
+  }
+
   /// Modes of a body `factor` times as large.
   static void scale_modes(bank::Bank& bank, double factor) {
     for (std::size_t m = 0; m < bank.mode_count(); ++m) {
@@ -438,16 +458,18 @@ class Reader {
     const double mass_ratio = model_kg && placement.mass_kg ? *model_kg / *placement.mass_kg : 1.0 / cube;
     const double turn = std::sqrt(mass_ratio);
     std::vector<double> shapes(3 * modes * points);
+    const gltf::Numbers& rows = air_ && air_->shapes ? *air_->shapes : model_.shapes;
     for (std::size_t m = 0; m < modes; ++m) {
       bank.eigenvalue_rad2_s2.push_back(lambda[order[m]]);
       bank.decay_per_s.push_back(model_.decay_per_s[order[m]]);
       for (std::size_t v = 0; v < points; ++v)
         for (std::size_t c = 0; c < 3; ++c) {
-          const double phi = model_.shapes.get(order[m] * model_.positions.size() + static_cast<std::size_t>(used_[v]), c);
+          const double phi = rows.get(order[m] * model_.positions.size() + static_cast<std::size_t>(used_[v]), c);
           if (!std::isfinite(phi)) model.fail("shapes", fmt::format("mode {} moves point {} by {}", order[m], v, phi));
           shapes[(v * modes + m) * 3 + c] = turn * phi;
         }
     }
+    if (air_) take_multipoles(order, placement.scale / factor, factor, turn, bank);
     settle_damping(bank);
     if (choice.is_unscaled) scale_modes(bank, factor);
     read_mass(model, placement, calc_solid(bank.vertices_m, bank.triangles), factor, bank);
@@ -479,6 +501,7 @@ class Reader {
   const GlbReading* reading_;
   base::Object root_, extension_;
   Model model_;
+  std::optional<GlbMultipoles> air_;
   std::vector<std::int32_t> used_;  // used points of another program's model
   std::string reading_of_scale_;
   std::vector<std::string> warnings_;

@@ -9,6 +9,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "runtime/bank/blows.hpp"
@@ -21,6 +22,7 @@
 #include "runtime/base/version.hpp"
 #include "runtime/exchange/damped.hpp"
 #include "runtime/exchange/glb.hpp"
+#include "runtime/exchange/glb_multipoles.hpp"
 #include "runtime/exchange/gltf/writer.hpp"
 
 namespace carillon::exchange {
@@ -137,6 +139,13 @@ void write_glb(const bank::Bank& bank, const GlbOptions& options, const std::fun
   Json model = Json::object();
   model.set("name", options.name).set("frequencies", writer.add_scalars(freq_hz)).set("decayRates", writer.add_scalars(decay_per_s));
   model.set("positions", positions).set("shapes", add_shapes(bank, swinging, writer)).set("indices", indices).set("material", 0);
+  std::vector<std::string> used{kExtension};
+  if (!bank.multipoles.is_empty()) {
+    std::vector<std::size_t> modes;
+    for (const Played& played : swinging) modes.push_back(played.mode);
+    model.set("extensions", Json::object().set(kMultipoles, describe_multipoles(bank, modes, writer)));
+    used.emplace_back(kMultipoles);
+  }
   model.set("massProperties", describe_mass(bank.rigid)).set("extras", add_extras(bank, swinging, still, writer));
 
   const auto list = [](const Json& only) { return Json::array().add(only); };
@@ -152,7 +161,7 @@ void write_glb(const bank::Bank& bank, const GlbOptions& options, const std::fun
   node.set("extensions", Json::object().set(kExtension, Json::object().set("modalModel", 0)));
   Json extension = Json::object();
   extension.set("acousticMaterials", list(describe_material(bank, options.name))).set("modalModels", list(model));
-  writer.json().set("extensionsUsed", Json::array(std::vector<std::string>{kExtension}));
+  writer.json().set("extensionsUsed", Json::array(used));
   writer.json().set("extensions", Json::object().set(kExtension, extension));
   writer.json().set("scene", 0).set("scenes", list(Json::object().set("nodes", Json::array(std::vector<int>{0}))));
   writer.json().set("nodes", list(node)).set("meshes", list(mesh));

@@ -74,6 +74,8 @@ std::size_t require_index(base::Object& object, const char* key, std::size_t siz
   return *index;
 }
 
+std::size_t count_components(std::string_view type) { return type == "SCALAR" ? 1 : type == "VEC2" ? 2 : 3; }
+
 std::size_t find_component_bytes(long long component) {
   constexpr std::size_t kSizes[] = {1, 1, 2, 2, 0, 4, 4};
   return kSizes[component - 5120];
@@ -184,7 +186,7 @@ Numbers File::read(base::Object& owner, const char* key, const char* type, std::
                                                components.size() == kIndexTypes.size() ? "an index" : "a position", key));
   numbers.is_normalised_ = accessor.boolean_or("normalized", false);
   numbers.count_ = accessor.integer("count", 1, kHuge);
-  const std::size_t size = find_component_bytes(component) * (std::string_view(type) == "SCALAR" ? 1 : 3);
+  const std::size_t size = find_component_bytes(component) * count_components(type);
   if (!accessor.has("bufferView")) accessor.fail("", fmt::format("accessor {} has no \"bufferView\"; export it again", a));
   const std::size_t v = require_index(accessor, "bufferView", views_.size(), "bufferView");
   base::Object& view = views_[v];

@@ -40,7 +40,7 @@ inline constexpr std::initializer_list<Component> kIndexTypes{Component::kUnsign
 inline constexpr std::initializer_list<Component> kVertexTypes{Component::kByte,          Component::kUnsignedByte, Component::kShort,
                                                                Component::kUnsignedShort, Component::kUnsignedInt,  Component::kFloat};
 
-/// View of an accessor: `count` entries of one (SCALAR), three (VEC3) ... numbers. Valid as long as the file.
+/// View of an accessor: `count` entries of one (SCALAR), two (VEC2) or three (VEC3) numbers. Valid as long as the file.
 class Numbers {
  public:
   std::size_t count() const { return count_; }

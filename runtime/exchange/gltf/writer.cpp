@@ -91,6 +91,10 @@ int Writer::add_scalars(std::span<const float> values) {
   return add_accessor(add_view(values, sizeof(float), 0), static_cast<int>(Component::kFloat), "SCALAR", values.size());
 }
 
+int Writer::add_pairs(std::span<const float> values) {
+  return add_accessor(add_view(values, sizeof(float), 0), static_cast<int>(Component::kFloat), "VEC2", values.size() / 2);
+}
+
 int Writer::add_rows(std::size_t blocks, std::size_t rows, const std::function<void(std::size_t, std::span<float>)>& fill) {
   const int view = add_view(std::span<const float>(), sizeof(float), 0, 3 * sizeof(float) * blocks * rows);
   buffer_.reserve(buffer_.size() + 3 * sizeof(float) * blocks * rows);

@@ -30,6 +30,8 @@ class Writer {
   int add_indices(std::span<const std::int32_t> corners, std::size_t vertices);
   /// Scalars other than vertex attributes.
   int add_scalars(std::span<const float> values);
+  /// Rows of two.
+  int add_pairs(std::span<const float> values);
   /// Rows of three, in blocks: fill(block, numbers) writes all numbers of a block.
   int add_rows(std::size_t blocks, std::size_t rows, const std::function<void(std::size_t block, std::span<float> numbers)>& fill);
   /// Raw bytes, aligned to 8; returns the view's index.

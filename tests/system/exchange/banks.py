@@ -75,5 +75,29 @@ def render_blow(folder, bank, point, impulse, centre, seconds=1.0, rate=48000):
     return read_wav(folder / "blow.wav")[0][:, 0]
 
 
+def hear_modes(folder, bank, point, impulse, microphones, freq_hz, decay, rate=48000, gain=1e-4):
+    """(microphones, modes): pressures [Pa] of the modes at time 0, by a fit to what microphones hear of a blow; what it leaves [dB]."""
+    scene = {
+        "duration_s": 1.2,
+        "sample_rate_hz": rate,
+        "gravity_m_s2": [0, 0, 0],
+        "bodies": [{"name": "body", "bank": str(bank), "fixed": True, "effects": ["modal", "air_delay", "directivity"]}],
+        "strikes": [{"time_s": 0.0, "body": "body", "point_m": list(map(float, point)), "impulse_n_s": impulse}],
+        "microphones": numpy.asarray(microphones).tolist(),
+        "output": {"gain": gain, "format": "float", "fade_end": False},
+        "quality": {"silence_pa": 1e-15},
+    }
+    (folder / "modes.json").write_text(json.dumps(scene))
+    run(BIN / "carillon-render", "-q", "modes.json", "-o", "modes.wav", cwd=folder)
+    heard = read_wav(folder / "modes.wav")[0] / gain
+    first = rate // 50  # the sound has arrived everywhere
+    time_s = numpy.arange(first, len(heard)) / rate
+    swing = numpy.exp((-decay + 1j * numpy.sqrt((2 * numpy.pi * freq_hz) ** 2 - decay**2)) * time_s[:, None])
+    basis = numpy.concatenate([swing.real, -swing.imag], axis=1)
+    fitted, *_ = numpy.linalg.lstsq(basis, heard[first:], rcond=None)
+    modes = len(freq_hz)
+    return (fitted[:modes] + 1j * fitted[modes:]).T, calc_db(basis @ fitted - heard[first:], heard[first:])
+
+
 def calc_db(difference, whole):
     return 20.0 * numpy.log10(max(1e-30, numpy.sqrt(numpy.mean(difference**2))) / numpy.sqrt(numpy.mean(whole**2)))

@@ -4,12 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -69,18 +71,163 @@ bank::Bank make_damped() {
   return bank;
 }
 
-// The extension has the order and decays in air; the bank returns without them.
+/// Component `i` of the coefficients of mode `m` [Pa s m^-1 kg^-1/2], i below 2 (order + 1)^2.
+double get_component(const bank::Multipoles& air, std::size_t m, std::size_t i) {
+  std::size_t first = 0;
+  for (std::size_t k = 0; k < m; ++k) first += 2 * bank::count_coefficients(air.order[k]);
+  return air.scale[m] * air.coefficient[first + i];
+}
+
+/// Both banks radiate the same, up to the rounding of float and, for coefficients, of 16 bits; lengths of `found` times `size`.
+void compare_air(const bank::Bank& found, const bank::Bank& played, double size = 1.0) {
+  const bank::Multipoles &a = found.multipoles, &b = played.multipoles;
+  ASSERT_EQ(a.order, b.order);
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(a.centre_m[c], size * b.centre_m[c], 1e-15);
+  EXPECT_NEAR(a.radius_m, size * b.radius_m, 1e-15);
+  EXPECT_NEAR(a.nearest_m, size * b.nearest_m, 1e-15);
+  EXPECT_EQ(a.air_density_kg_m3, b.air_density_kg_m3);
+  EXPECT_EQ(a.sound_speed_ms, b.sound_speed_ms);
+  for (std::size_t m = 0; m < a.order.size(); ++m) {
+    const double scale = b.scale[m] / std::pow(size, 1.5);
+    EXPECT_NEAR(a.freq_hz[m] * size / b.freq_hz[m], 1.0, 1e-6);
+    EXPECT_NEAR(a.decay_per_s[m] * size / b.decay_per_s[m], 1.0, 1e-7);
+    EXPECT_NEAR(a.error_db[m], b.error_db[m], 1e-5);
+    for (std::size_t i = 0; i < 2 * bank::count_coefficients(a.order[m]); ++i)
+      EXPECT_NEAR(get_component(a, m, i), get_component(b, m, i) / std::pow(size, 1.5), 1e-7 * 32767.0 * scale) << m << " " << i;
+  }
+}
+
+constexpr GlbReading kPlain{.model = {}, .ignores_extras = true, .material = nullptr};
+
+// The extension has the order and decays in air.
 TEST(Glb, of_a_bank_with_multipoles_is_lossless) {
   const bank::Bank bank = bank::example::make_radiating_bank(2, 9), played = bank::calc_corrected(bank);
   const std::string glb = to_glb(bank);
   EXPECT_EQ(bank::make_bank_bytes(parse_glb(glb, "body.glb")), bank::make_bank_bytes(bank));
-  const bank::Bank plain = parse_glb(glb, "body.glb", {.ignores_extras = true});
-  EXPECT_TRUE(plain.multipoles.is_empty());
+  const bank::Bank plain = parse_glb(glb, "body.glb", kPlain), again = bank::calc_corrected(plain);
+  EXPECT_TRUE(bank::find_faults(plain).empty());
+  compare_air(plain, played);
   ASSERT_EQ(plain.mode_count(), played.mode_count());
   for (std::size_t m = 0; m < plain.mode_count(); ++m) {
-    EXPECT_NEAR(plain.freq_hz(m) / played.freq_hz(m), 1.0, 1e-6);
-    EXPECT_NEAR(plain.decay_per_s[m] / played.decay_per_s[m], 1.0, 1e-6);
+    EXPECT_NEAR(again.freq_hz(m) / played.freq_hz(m), 1.0, 1e-6);
+    EXPECT_NEAR(again.decay_per_s[m] / played.decay_per_s[m], 1.0, 1e-6);  // radiation counts once
+    EXPECT_NEAR(again.radiation_gain[m] / played.radiation_gain[m], 1.0, 1e-6);
+    EXPECT_NEAR(plain.decay_per_s[m], played.decay_per_s[m] - played.multipoles.decay_per_s[m], 1e-6 * played.decay_per_s[m]);
   }
+  // Once more, nothing changes.
+  const bank::Bank twice = parse_glb(to_glb(plain), "body.glb", kPlain);
+  EXPECT_EQ(twice.multipoles.coefficient, plain.multipoles.coefficient);
+  EXPECT_EQ(twice.shape, plain.shape);
+}
+
+TEST(Glb, coupled_modes_have_their_shapes_in_air) {
+  bank::Bank bank = bank::example::make_radiating_bank(2, 9);
+  bank::Multipoles& air = bank.multipoles;
+  const std::size_t modes = bank.mode_count();
+  for (std::size_t m = 0; m < modes; ++m) {
+    const double whole = 1.0 / std::sqrt(1.0 + air.added_mass[m]);
+    const std::size_t other = m == 0 ? 1 : 0;
+    air.mixing.count.push_back(m < 2 ? 3 : 1);
+    if (m >= 2) {
+      air.mixing.motion.push_back(static_cast<std::int32_t>(m));
+      air.mixing.part.push_back(whole);
+      continue;
+    }
+    for (const std::size_t j : {std::min(m, other), std::max(m, other)}) {
+      air.mixing.motion.push_back(static_cast<std::int32_t>(j));
+      air.mixing.part.push_back((j == m ? 0.8 : m == 0 ? 0.48 : -0.48) * whole);
+    }
+    air.mixing.motion.push_back(static_cast<std::int32_t>(modes + 2));  // a translation
+    air.mixing.part.push_back(0.36 * whole);
+  }
+  ASSERT_TRUE(bank::find_faults(bank).empty()) << bank::find_faults(bank)[0];
+  const std::string glb = to_glb(bank);
+  EXPECT_EQ(bank::make_bank_bytes(parse_glb(glb, "body.glb")), bank::make_bank_bytes(bank));
+  const bank::Bank plain = parse_glb(glb, "body.glb", kPlain), played = bank::calc_corrected(bank);
+  compare_air(plain, played);
+  EXPECT_TRUE(plain.multipoles.mixing.is_empty());
+  for (std::size_t m = 0; m < modes; ++m)
+    for (std::size_t v = 0; v < bank.vertex_count(); ++v)
+      for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(plain.shape_at(v, m)[c], played.shape_at(v, m)[c], 1e-3 * played.shape_scale[m]);
+}
+
+TEST(Glb, multipoles_scale_with_the_node) {
+  const bank::Bank bank = bank::example::make_radiating_bank(2, 9);
+  const std::string glb =
+      replace_json(to_glb(bank), R"("nodes": [{"name": "body", )", R"("nodes": [{"scale": [2, 2, 2], "name": "body", )");
+  const bank::Bank plain = parse_glb(glb, "body.glb", kPlain);
+  compare_air(plain, bank::calc_corrected(bank), 2.0);
+}
+
+TEST(Glb, multipoles_are_checked) {
+  const std::string whole = to_glb(bank::example::make_radiating_bank(2, 9));
+  const auto change = [&](const std::string& from, const std::string& to) { return replace_json(whole, from, to); };
+  const std::size_t at = whole.find("\"CARILLON_multipoles\": {");
+  ASSERT_NE(at, std::string::npos);
+  const auto find_number = [&](const std::string& key) {
+    const std::size_t from = whole.find("\"" + key + "\": ", at);
+    return whole.substr(from, whole.find_first_of(",}", from) - from);
+  };
+  const std::string coefficients = find_number("coefficients"), orders = find_number("orders"), radius = find_number("radius");
+  const std::string place = "modalModels[0].extensions.CARILLON_multipoles.";
+  const struct {
+    std::string bytes, path, words;
+  } cases[] = {
+      {change(coefficients, R"("coefficients": 900)"), "coefficients", "no accessor has this index"},
+      {change(coefficients, R"("coefficients": -1)"), "coefficients", "no accessor has this index"},
+      {change(coefficients, R"("coefficients": 0)"), "", "has to be VEC2"},
+      {change(coefficients, R"("coefficient": 0)"), "coefficients", "is missing"},
+      {change(find_number("decayRates"), find_number("errors").replace(1, 6, "decayRates")), "decayRates", "not between 0 and"},
+      {change(find_number("decayRates"), R"("decayRates": 2)"), "", "is not a type of"},
+      {change(orders, R"("orders": [121)"), "orders", "121; an order is a whole number from 0 to 120"},
+      {change(orders, R"("orders": [-1)"), "orders", "-1; an order"},
+      {change(orders, R"("orders": [0.5)"), "orders", "0.5; an order"},
+      {change(orders, orders + ", 1"), "orders", "10 numbers, but the model has 9 modes"},
+      {change(orders, R"("orders": [120)"), "coefficients", "need"},
+      {change(radius, R"("radius": 0)"), "radius", ""},
+      {change(radius, R"("radius": 1e999)"), "", "number too big"},
+      {change(radius, R"("radius": 9e9)"), "validRadius", "inside the sphere"},
+  };
+  for (const auto& one : cases)
+    for (const bool is_plain : {false, true}) {
+      const std::string said = find_error(one.bytes, {.model = {}, .ignores_extras = is_plain, .material = nullptr});
+      EXPECT_THAT(said, ::testing::AllOf(::testing::StartsWith("body.glb"), ::testing::HasSubstr(one.words)));
+      if (!one.path.empty()) EXPECT_THAT(said, ::testing::HasSubstr(place + one.path));
+    }
+  // Numbers that are not finite: the first coefficient.
+  std::uint32_t length = 0;
+  std::memcpy(&length, whole.data() + 12, 4);
+  const std::size_t accessor = std::stoul(coefficients.substr(coefficients.find(' ')));
+  const auto find_nth = [&](const std::string& what, std::size_t from, std::size_t n) {
+    std::size_t place_of = whole.find(what, from);
+    for (std::size_t k = 0; k < n; ++k) place_of = whole.find(what, place_of + 1);
+    return place_of;
+  };
+  const std::size_t view_at = find_nth("\"bufferView\": ", whole.find("\"accessors\": "), accessor);
+  const std::size_t view = std::stoul(whole.substr(view_at + 14));
+  const std::size_t offset_at = find_nth("\"byteOffset\": ", whole.find("\"bufferViews\": "), view);
+  const std::size_t first = 20 + length + 8 + std::stoul(whole.substr(offset_at + 14));
+  for (const float value : {std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+    std::string bytes = whole;
+    std::memcpy(bytes.data() + first, &value, 4);
+    EXPECT_THAT(find_error(bytes, kPlain),
+                ::testing::AllOf(::testing::HasSubstr("coefficients"), ::testing::HasSubstr("not a finite number")));
+  }
+  // Another coefficient than in the extras.
+  std::string bytes = whole;
+  const float value = 1.0F;
+  std::memcpy(bytes.data() + first, &value, 4);
+  EXPECT_THAT(find_error(bytes), ::testing::HasSubstr("CARILLON_multipoles differs from its extras"));
+}
+
+TEST(Glb, without_the_multipoles_is_read_as_before) {
+  const bank::Bank bank = bank::example::make_radiating_bank(2, 9), played = bank::calc_corrected(bank);
+  const std::string glb = replace_json(to_glb(bank), R"("CARILLON_multipoles": {)", R"("OTHER_multipoles": {)");
+  EXPECT_EQ(bank::make_bank_bytes(parse_glb(glb, "body.glb")), bank::make_bank_bytes(bank));
+  const bank::Bank plain = parse_glb(glb, "body.glb", kPlain);
+  EXPECT_TRUE(plain.multipoles.is_empty());
+  for (std::size_t m = 0; m < plain.mode_count(); ++m) EXPECT_NEAR(plain.decay_per_s[m] / played.decay_per_s[m], 1.0, 1e-6);
+  EXPECT_EQ(to_glb(make_damped()).find("CARILLON"), std::string::npos);
 }
 
 TEST(Glb, of_released_banks_is_lossless) {
@@ -295,11 +442,13 @@ TEST(Glb, mutations_give_a_bank_or_an_error) {
 }
 
 TEST(Glb, as_the_corpus_of_the_fuzz_target_is_read) {
-  const std::filesystem::path file =
-      std::filesystem::path(carillon::tests::get_source_dir()) / "tests/unit/runtime/exchange/corpus/box.glb";
-  std::ifstream stream(file, std::ios::binary);
-  const std::string bytes(std::istreambuf_iterator<char>(stream), {});
-  EXPECT_EQ(parse_glb(bytes, "box.glb").mode_count(), 6);
+  const auto read = [](const std::string& name) {
+    const std::filesystem::path folder = std::filesystem::path(carillon::tests::get_source_dir()) / "tests/unit/runtime/exchange/corpus";
+    std::ifstream stream(folder / name, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  EXPECT_EQ(parse_glb(read("box.glb"), "box.glb").mode_count(), 6);
+  EXPECT_EQ(parse_glb(read("air.glb"), "air.glb", kPlain).multipoles.order.size(), 3);
 }
 
 }  // namespace
