@@ -110,6 +110,12 @@ def list_left():
 
 
 class BakeTest(unittest.TestCase):
+    def test_its_version_is_that_of_the_programs(self):
+        import carillon_bake
+
+        told = subprocess.run(["carillon-render", "--version"], capture_output=True, text=True, check=True).stdout
+        self.assertIn(" " + ".".join(map(str, carillon_bake.bl_info["version"])), told)
+
     def test_a_fall(self):
         scene, box = make_scene()
         self.assertEqual(bake(), {"FINISHED"})
