@@ -113,8 +113,8 @@ class BakeTest(unittest.TestCase):
     def test_its_version_is_that_of_the_programs(self):
         import carillon_bake
 
-        told = subprocess.run(["carillon-render", "--version"], capture_output=True, text=True, check=True).stdout
-        self.assertIn(" " + ".".join(map(str, carillon_bake.bl_info["version"])), told)
+        printed = subprocess.run(["carillon-render", "--version"], capture_output=True, text=True, check=True).stdout
+        self.assertIn(" " + ".".join(map(str, carillon_bake.bl_info["version"])), printed)
 
     def test_a_fall(self):
         scene, box = make_scene()
