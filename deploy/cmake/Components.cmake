@@ -29,7 +29,8 @@ carillon_component(EXCHANGE "banks and modes in formats of other programs, glTF 
   runtime/exchange/commands.cpp runtime/exchange/faust.hpp runtime/exchange/frf.cpp runtime/exchange/frf.hpp runtime/exchange/from_frd.cpp
   runtime/exchange/from_glb.cpp runtime/exchange/from_pch.cpp runtime/exchange/from_uff.cpp runtime/exchange/from_unv.cpp
   runtime/exchange/generalised_mass.cpp runtime/exchange/glb.hpp runtime/exchange/glb_multipoles.cpp runtime/exchange/glb_multipoles.hpp
-  runtime/exchange/gltf_scene.cpp runtime/exchange/gltf_scene.hpp
+  runtime/exchange/gltf_contacts.cpp runtime/exchange/gltf_contacts.hpp runtime/exchange/gltf_folder.cpp runtime/exchange/gltf_frames.hpp
+  runtime/exchange/gltf_geometry.cpp runtime/exchange/gltf_geometry.hpp runtime/exchange/gltf_scene.cpp runtime/exchange/gltf_scene.hpp
   runtime/exchange/measured.cpp runtime/exchange/measured.hpp runtime/exchange/results_lines.hpp runtime/exchange/scale_rule.cpp
   runtime/exchange/scale_rule.hpp runtime/exchange/silent.cpp runtime/exchange/silent.hpp runtime/exchange/sofa.hpp
   runtime/exchange/solid.cpp runtime/exchange/solid.hpp runtime/exchange/solved_model.cpp runtime/exchange/solved_model.hpp

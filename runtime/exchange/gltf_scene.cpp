@@ -18,76 +18,36 @@
 #include <set>
 #include <utility>
 
-#include "runtime/bank/write.hpp"
 #include "runtime/base/error.hpp"
-#include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/exchange/gltf/file.hpp"
 #include "runtime/exchange/gltf/nodes.hpp"
+#include "runtime/exchange/gltf_contacts.hpp"
+#include "runtime/exchange/gltf_frames.hpp"
+#include "runtime/exchange/gltf_geometry.hpp"
 #include "runtime/exchange/silent.hpp"
 #include "runtime/material/solids.hpp"
 
 namespace carillon::exchange {
 namespace {
 
-constexpr const char* kShapesExtension = "KHR_implicit_shapes";
-constexpr std::uint64_t kMaxSceneBytes = 1ULL << 32;
-constexpr std::size_t kMaxSceneBodies = 1000, kMaxMeshCorners = 30'000'000;
+constexpr std::size_t kMaxSceneBodies = 1000;
 constexpr double kSceneSeconds = 4.0;
-constexpr double kLevel = 1e-6;                                                  // heights of one level, and directions of one line
-constexpr double kLikeShape = 0.01;                                              // extents of a collider and of the surface of a model
-constexpr double kFarM = 1e4, kFastMS = 300.0, kFastRadS = 1e4, kRoughM = 1e-3;  // limits of scene files
+constexpr double kLevel = 1e-6;                                     // heights of one level, and directions of one line
+constexpr double kLikeShape = 0.01;                                 // extents of a collider and of the surface of a model
+constexpr double kFastMS = 300.0, kFastRadS = 1e4, kRoughM = 1e-3;  // limits of scene files
 constexpr double kDefaultRoughnessM = 2e-6, kDefaultFriction = 0.6, kDefaultRestitution = 0.0;  // of the extensions
-
-Eigen::Matrix3d get_linear(const gltf::Matrix& m) {
-  Eigen::Matrix3d linear;
-  linear << m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10];
-  return linear;
-}
-
-Eigen::Vector3d get_place(const gltf::Matrix& m) { return {m[12], m[13], m[14]}; }
-Eigen::Vector3d to_eigen(const Vec3& v) { return {v[0], v[1], v[2]}; }
-Vec3 to_vec3(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
-
-/// y up to z up.
-Eigen::Vector3d raise(const Eigen::Vector3d& v) { return {v[0], -v[2], v[1]}; }
-
-/// The nearest rotation; that of a reflection is of its negative.
-Eigen::Matrix3d find_rotation(const Eigen::Matrix3d& linear) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(linear, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d turn = svd.matrixU() * svd.matrixV().transpose();
-  return turn.determinant() < 0.0 ? Eigen::Matrix3d(-turn) : turn;
-}
-
-base::Json make_list(const Eigen::Vector3d& v) { return base::Json::array(std::array<double, 3>{v[0] + 0.0, v[1] + 0.0, v[2] + 0.0}); }
-
-/// Restitution or friction of a body, and how it combines with that of another one.
-struct Contact {
-  double value = 0.0;
-  std::string mode;
-  auto operator<=>(const Contact&) const = default;
-};
-
-double combine(const Contact& a, const Contact& b) {
-  for (const Contact* of : {&a, &b})
-    if (of->mode == "average") return 0.5 * (a.value + b.value);
-  for (const Contact* of : {&a, &b})
-    if (of->mode == "minimum") return std::min(a.value, b.value);
-  for (const Contact* of : {&a, &b})
-    if (of->mode == "maximum") return std::max(a.value, b.value);
-  return a.value * b.value;
-}
 
 struct Body {
   std::optional<std::size_t> motion, model_node, model;  // nodes; index of the model
   std::vector<std::size_t> colliders;                    // nodes
   bool is_fixed = true, is_in_ground = false;
   std::string name;
-  base::Json entry;                                 // of the scene file
-  std::optional<Contact> restitution, friction;     // of a physics material
-  std::vector<std::optional<std::size_t>> kind{};   // physics material and acoustic surface, to compare
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // z up
-  double lowest_m = 0.0;                            // of its surface, at the start
+  base::Json entry;                                  // of the scene file
+  std::optional<GltfContact> restitution, friction;  // of a physics material
+  std::vector<std::optional<std::size_t>> kind{};    // physics material and acoustic surface, to compare
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();   // z up
+  double lowest_m = 0.0;                             // of its surface, at the start
 };
 
 struct KnownBank {
@@ -134,7 +94,6 @@ class SceneReader {
     surfaces_ = open(kExtension, "acousticSurfaces");
     physics_materials_ = open(kPhysicsExtension, "physicsMaterials");
     shapes_ = open(kShapesExtension, "shapes");
-    meshes_ = root_.objects("meshes");
     audio_.resize(graph_.nodes.size());
     physics_.resize(graph_.nodes.size());
   }
@@ -239,8 +198,9 @@ class SceneReader {
     if (body.motion) read_velocity(body);
     read_contact(body);
     for (std::size_t c = 0; c < 3; ++c)
-      if (!(std::abs(body.place[static_cast<int>(c)]) <= kFarM))
-        graph_.nodes[node].fail("", fmt::format("it is {:.3g} m from the origin; at most {:g} m are rendered", body.place.norm(), kFarM));
+      if (!(std::abs(body.place[static_cast<int>(c)]) <= kFarthestGltfM))
+        graph_.nodes[node].fail(
+            "", fmt::format("it is {:.3g} m from the origin; at most {:g} m are rendered", body.place.norm(), kFarthestGltfM));
     ++made_.bodies;
   }
 
@@ -380,13 +340,6 @@ class SceneReader {
     return true;
   }
 
-  static double read_positive(base::Object& owner, const char* key, double fallback, double low, double high) {
-    if (!owner.has(key)) return fallback;
-    const double value = owner.number(key);
-    if (!(value >= low && value <= high)) owner.fail(key, fmt::format("is {:g}; give {:g} to {:g}", value, low, high));
-    return value;
-  }
-
   KnownBank put_bank(const std::string& name, const bank::Bank& bank) {
     std::string stem;
     for (const char c : name.substr(0, 60)) stem += std::isalnum(static_cast<unsigned char>(c)) ? c : '-';
@@ -424,57 +377,8 @@ class SceneReader {
   /// Shape of a collider in the space of its node.
   Surface read_shape(std::size_t n) {
     base::Object geometry = open_geometry(n);
-    if (geometry.has("shape") == geometry.has("node")) geometry.fail("", "must have one of \"shape\" and \"node\"; give one of them");
-    if (const auto node = gltf::find_index(geometry, "node", graph_.nodes.size(), "node")) {
-      if (geometry.boolean_or("convexHull", false)) warn(n, "its collider is the mesh itself, not its convex hull");
-      return read_mesh(*node);
-    }
-    base::Object& shape = shapes_[*gltf::find_index(geometry, "shape", shapes_.size(), "shape")];
-    const std::string type = shape.choice("type", {"box", "sphere", "cylinder", "capsule"});
-    base::Object own = shape.object(type);
-    if (type == "box") {
-      const Vec3 size = own.numbers<3>("size");
-      for (const double x : size)
-        if (!(x > 0.0 && x <= kFarM)) own.fail("size", fmt::format("has a side of {:g} m; give more than 0, at most {:g}", x, kFarM));
-      return make_box(size);
-    }
-    if (type == "sphere") return make_sphere(read_positive(own, "radius", 0.5, 1e-9, kFarM));
-    const double height = read_positive(own, "height", 0.5, 1e-9, kFarM);
-    const double bottom = read_positive(own, "radiusBottom", 0.25, 0.0, kFarM), top = read_positive(own, "radiusTop", 0.25, 0.0, kFarM);
-    if (!(std::max(bottom, top) > 0.0)) own.fail("radiusTop", "both radii are 0; give one that is not");
-    return type == "cylinder" ? make_cylinder(height, bottom, top) : make_capsule(height, bottom, top);
-  }
-
-  Surface read_mesh(std::size_t n) {
-    const std::optional<std::size_t> mesh = gltf::find_index(graph_.nodes[n], "mesh", meshes_.size(), "mesh");
-    if (!mesh) graph_.nodes[n].fail("", "a collider takes the mesh of this node, and it has none; name another node or a shape");
-    Surface surface;
-    for (base::Object& primitive : meshes_[*mesh].objects("primitives")) {
-      if (primitive.integer_if("mode", 0, 6).value_or(4) != 4) primitive.fail("mode", "must be 4, triangles; export it as triangles");
-      base::Object attributes = primitive.object("attributes");
-      const gltf::Numbers points = file_.read(attributes, "POSITION", "VEC3", gltf::kVertexTypes);
-      const std::size_t before = surface.vertices_m.size();
-      std::optional<gltf::Numbers> corners;
-      if (primitive.has("indices")) corners = file_.read(primitive, "indices", "SCALAR", gltf::kIndexTypes);
-      const std::size_t count = corners ? corners->count() : points.count();
-      if (before + points.count() > kMaxMeshCorners || 3 * surface.triangles.size() + count > kMaxMeshCorners)
-        primitive.fail("", "its mesh is too large for a collider; give a simpler one");
-      for (std::size_t i = 0; i < points.count(); ++i) {
-        const Vec3 p{points.get(i, 0), points.get(i, 1), points.get(i, 2)};
-        if (!is_finite(p)) attributes.fail("POSITION", fmt::format("point {} is not finite", i));
-        surface.vertices_m.push_back(p);
-      }
-      if (count % 3 != 0) primitive.fail("indices", fmt::format("{} corners are no whole number of triangles", count));
-      for (std::size_t i = 0; i < count; ++i) {
-        const double v = corners ? corners->get(i, 0) : static_cast<double>(i);
-        if (!(v < static_cast<double>(points.count())))
-          primitive.fail("indices", fmt::format("index {} is {}, but there are only {} points", i, v, points.count()));
-        if (i % 3 == 0) surface.triangles.emplace_back();
-        surface.triangles.back()[i % 3] = static_cast<std::int32_t>(before + static_cast<std::size_t>(v));
-      }
-    }
-    weld(surface);
-    return surface;
+    if (geometry.boolean_or("convexHull", false) && geometry.has("node")) warn(n, "its collider is the mesh itself, not its convex hull");
+    return read_geometry(file_, graph_, geometry);
   }
 
   /// Adds the shape of a collider, in metres in a frame.
@@ -543,53 +447,20 @@ class SceneReader {
     const auto read = [&](const char* key, double fallback, const char* mode_key) {
       const double value = material.number_or(key, fallback);
       if (!(value >= 0.0)) material.fail(key, fmt::format("is {:g}; it must not be negative", value));
-      return Contact{value, material.choice_or(mode_key, {"average", "minimum", "maximum", "multiply"}, "average")};
+      return GltfContact{value, material.choice_or(mode_key, {"average", "minimum", "maximum", "multiply"}, "average")};
     };
     body.restitution = read("restitution", kDefaultRestitution, "restitutionCombine");
     body.friction = read("dynamicFriction", kDefaultFriction, "frictionCombine");
   }
 
-  /// The value of each kind of body, so that the geometric mean of two, as scenes combine, is the value that the extension combines. With
-  /// one kind of moving bodies this has a solution; else the values themselves, with a warning.
-  void settle(const char* key, std::optional<Contact> Body::*member, double limit) {
-    std::map<Contact, int> moving, fixed;
+  void settle(const char* key, std::optional<GltfContact> Body::*member, double limit) {
+    GltfContacts contacts;
     for (const Body& body : bodies_)
-      if ((body.is_in_ground || !body.entry.is_null()) && body.*member) ++(body.is_fixed ? fixed : moving)[*(body.*member)];
-    std::map<std::pair<bool, Contact>, double> values;  // by is_fixed
-    for (const auto& [contact, count] : moving) values[{false, contact}] = contact.value;
-    for (const auto& [contact, count] : fixed) values[{true, contact}] = contact.value;
-    // Values that agree as they are stay as they are.
-    const auto agrees = [&](const Contact& a, const Contact& b) { return std::abs(std::sqrt(a.value * b.value) - combine(a, b)) <= 1e-9; };
-    bool is_settled = true;
-    for (const auto& [a, count] : moving) {
-      for (const auto& [b, number] : moving) is_settled = is_settled && ((a == b && count == 1) || agrees(a, b));
-      for (const auto& [b, number] : fixed) is_settled = is_settled && agrees(a, b);
-    }
-    if (!is_settled && moving.size() == 1) {
-      const auto& [own, count] = *moving.begin();
-      double& mine = values[{false, own}];
-      if (count > 1) mine = combine(own, own);
-      if (count == 1 && fixed.size() == 1) mine = combine(own, fixed.begin()->first);
-      for (const auto& [other, number] : fixed)
-        if (const double wanted = combine(own, other); mine > 0.0) values[{true, other}] = wanted * wanted / mine;
-    }
-    for (auto& [of, value] : values) value = std::clamp(value, 0.0, limit);
-    const auto check = [&](bool is_fixed, const Contact& a, const Contact& b) {
-      const double taken = std::sqrt(values[{false, a}] * values[{is_fixed, b}]), wanted = combine(a, b);
-      if (std::abs(taken - wanted) <= 0.005) return;
-      const std::string text =
-          fmt::format("the {} of two bodies is the geometric mean of both: {:.3g} where \"{}\" of {:g} and {:g} is {:.3g}", key, taken,
-                      std::min(a.mode, b.mode), a.value, b.value, wanted);
-      if (std::find(made_.warnings.begin(), made_.warnings.end(), text) == made_.warnings.end()) made_.warnings.push_back(text);
-    };
-    for (const auto& [a, count] : moving) {
-      for (const auto& [b, number] : moving)
-        if (a < b || (a == b && count > 1)) check(false, a, b);
-      for (const auto& [b, number] : fixed) check(true, a, b);
-    }
+      if ((body.is_in_ground || !body.entry.is_null()) && body.*member) contacts.add(*(body.*member), body.is_fixed);
+    contacts.settle(key, limit, made_.warnings);
     for (Body& body : bodies_)
       if (body.*member) {
-        const double value = values[{body.is_fixed, *(body.*member)}];
+        const double value = contacts.get(*(body.*member), body.is_fixed);
         if (body.is_in_ground)
           ground_.set(key, value);
         else if (!body.entry.is_null())
@@ -678,8 +549,8 @@ class SceneReader {
     if (camera_) {
       const gltf::Matrix& matrix = graph_.global[*camera_];
       const Eigen::Vector3d place = raise(get_place(matrix));
-      if (!(place.cwiseAbs().maxCoeff() <= kFarM))
-        graph_.nodes[*camera_].fail("camera", fmt::format("is more than {:g} m from the origin", kFarM));
+      if (!(place.cwiseAbs().maxCoeff() <= kFarthestGltfM))
+        graph_.nodes[*camera_].fail("camera", fmt::format("is more than {:g} m from the origin", kFarthestGltfM));
       const Eigen::Vector3d facing = raise(-get_linear(matrix).col(2));
       base::Json listener = base::Json::object().set("position_m", make_list(place));
       if (facing.norm() > 0.0) listener.set("facing", make_list(facing.normalized()));
@@ -703,7 +574,7 @@ class SceneReader {
   const Sink* sink_;
   base::Object root_;
   gltf::Graph graph_;
-  std::vector<base::Object> models_, materials_, surfaces_, physics_materials_, shapes_, meshes_;
+  std::vector<base::Object> models_, materials_, surfaces_, physics_materials_, shapes_;
   std::vector<std::optional<base::Object>> audio_, physics_;  // by node
   std::vector<Body> bodies_;
   std::map<std::string, KnownBank> banks_;  // by all that they are made of
@@ -719,19 +590,6 @@ class SceneReader {
 GltfScene read_gltf_scene(std::string_view bytes, const std::string& name, const GlbReading& reading,
                           const std::function<void(const std::string& file, const bank::Bank& bank)>& sink) {
   return SceneReader(bytes, name, reading, sink).read();
-}
-
-bool is_gltf(const std::filesystem::path& file) {
-  const std::string ending = base::find_extension(file);
-  return ending == ".gltf" || ending == ".glb";
-}
-
-GltfScene write_gltf_scene(const std::filesystem::path& file, const GlbReading& reading, const std::filesystem::path& folder) {
-  const std::string bytes = base::read_file(file, "glTF scene", kMaxSceneBytes);
-  GltfScene made = read_gltf_scene(bytes, file.string(), reading,
-                                   [&](const std::string& name, const bank::Bank& bank) { bank::write_bank(bank, folder / name); });
-  base::write_file(folder / kSceneFile, made.scene.text());
-  return made;
 }
 
 }  // namespace carillon::exchange

@@ -41,7 +41,7 @@ ScaleChoice choose_scale(const ScaleFacts& facts) {
     if (unscaled <= kDensityAgreement && unscaled <= initial) return choose(true, "massProperties.mass is density times volume as stored");
     if (initial <= kDensityAgreement) return choose(false, "massProperties.mass is density times scaled volume");
   }
-  ScaleChoice choice = choose(false, "no mass tells; the text of the extension says so");
+  ScaleChoice choice = choose(false, "the masses do not say; the text of the extension says so");
   choice.is_sure = false;
   choice.reason += fmt::format(": the lowest is {:.6g} Hz, and would be {:.6g} Hz if the model is unscaled (--scale-frequencies yes)",
                                facts.lowest_hz, facts.lowest_hz / facts.scale);

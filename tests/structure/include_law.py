@@ -77,7 +77,16 @@ RULES = {
     ),
     "runtime/render/sound": (["runtime/base"], ["cairo", "eigen", "fmt"]),
     "runtime/render": (
-        ["runtime/base", "runtime/bank", "runtime/events", "runtime/acoustics", "runtime/synth", "runtime/physics", "runtime/scene"],
+        [
+            "runtime/base",
+            "runtime/bank",
+            "runtime/events",
+            "runtime/acoustics",
+            "runtime/exchange",
+            "runtime/synth",
+            "runtime/physics",
+            "runtime/scene",
+        ],
         ["cli", "deflate", "fmt", "sndfile"],
     ),
     "runtime/render/live": (["runtime/base", "runtime/synth", "runtime/physics", "runtime/scene"], ["cli", "fmt", "portaudio"]),

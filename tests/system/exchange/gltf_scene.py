@@ -1,4 +1,4 @@
-"""Small scenes in glTF with KHR_audio_rigid_bodies, KHR_physics_rigid_bodies and KHR_implicit_shapes, and what they mean, by numpy alone."""
+"""Small scenes in glTF with the extensions of rigid bodies, their sound and their shapes, and what they mean, by numpy alone."""
 import base64
 import json
 import struct

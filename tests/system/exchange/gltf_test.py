@@ -16,7 +16,7 @@ import h5py
 import numpy
 
 from banks import BIN, calc_db, fixtures, read_wav, run
-from gltf_scene import AUDIO, DENSITY, PHYSICS, RAISE, Scene, calc_solid, make_ball, make_grid_box, make_rotation
+from gltf_scene import AUDIO, DENSITY, PHYSICS, RAISE, Scene, calc_solid, make_grid_box, make_rotation
 
 FREQ = [900.0, 1700.5, 3111.1, 5200.0]
 BAR = numpy.array([0.2, 0.05, 0.03])
@@ -497,7 +497,7 @@ def validate():
             report = json.loads(line)
             # An extension that the validator does not know is information.
             assert report["numErrors"] == 0 and report["numWarnings"] == 0, report
-            print(f"{pathlib.Path(report['file']).name}: no errors, no warnings, {report['numInfos']} informations")
+            print(f"{pathlib.Path(report['file']).name}: no errors, no warnings, {report['numInfos']} notes")
 
 
 if __name__ == "__main__":
