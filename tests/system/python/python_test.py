@@ -396,6 +396,30 @@ class Sounds(Case):
             self.assertGreater(abs(by_head - samples).max(), 0.02 * abs(samples).max())
         self.assertEqual(count_files(), before)
 
+    def test_a_silent_body_collides_and_only_clicks(self):
+        made = subprocess.run(
+            [BIN / "carillon-bank", "silent", "sphere:0.01", "--material", "steel", "-o", "bead.hdf"], capture_output=True
+        )
+        if made.returncode == 2 and b"EXCHANGE" in made.stderr:
+            self.skipTest("without the component")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        bead = carillon.Bank("bead.hdf")
+        self.assertEqual(len(bead.frequency_hz), 0)
+        peaks = {}
+        for effects in (["modal"], ["modal", "acceleration_noise"], []):
+            synth = carillon.Synthesiser()
+            body = synth.add_body(bead, position_m=(0, 1, 0), effects=effects)
+            synth.strike(body, (0, -1e-2, 0), point_m=(0, 0.01, 0), duration_s=5e-5)
+            peaks[len(effects)] = abs(synth.process(4800)).max()
+        self.assertEqual((peaks[0], peaks[1]), (0, 0))
+        self.assertGreater(peaks[2], 1e-3)
+        scene = {"duration_s": 0.3, "ground": {}, "bodies": [{"name": "bead", "bank": "bead.hdf", "position_m": [0, 0, 0.1]}]}
+        pathlib.Path("bead.json").write_text(json.dumps(scene))
+        self.assertGreater(abs(carillon.render("bead.json")[0]).max(), 1e-3)
+        scene["bodies"][0]["effects"] = []
+        pathlib.Path("bead.json").write_text(json.dumps(scene))
+        self.assertEqual(abs(carillon.render("bead.json")[0]).max(), 0)
+
     def test_invalid_scenes_are_one_message(self):
         scene = self.make_scene()
         self.refuse(carillon.InputError, lambda: carillon.render(scene), f"{os.getcwd()}/scene:", "rotation_axis_angle")
