@@ -219,6 +219,50 @@ class GltfTest(unittest.TestCase):
         sound, _ = read_wav(self.folder / "x.wav")
         self.assertGreater(abs(sound).max(), 0.5, report)
 
+    def test_a_model_and_colliders_below_a_motion(self):
+        """One body in the frame of its model, with the centre and the velocity of the motion."""
+        scene, _, points, triangles = make_drop(1.0)
+        mass = DENSITY * calc_solid(points, triangles)[0]
+        motion = {"mass": mass * 8, "centerOfMass": [0.1, 0.01, 0], "angularVelocity": [0, 3, 0]}
+        parent = scene.add_node(name="Whole", translation=[0, 2, 0], rotation=TILT, motion=motion)
+        child = scene.add_node(
+            parent, translation=[0.1, 0, 0], rotation=[0.5, 0.5, 0.5, 0.5], scale=[2, 2, 2], audio={"modalModel": 0}, shape=1
+        )
+        made, banks, done = self.convert(scene)
+        self.check_place(scene, child, points, self.find(made, "Whole"), banks["Whole"])
+        self.assertNotIn("warning", done.stderr)
+        self.check_frequencies(banks["Whole"], 0.5)
+        body, bank = self.find(made, "Whole"), banks["Whole"]
+        w, x, y, z = body["quaternion"]
+        centre = make_rotation([x, y, z, w]) @ bank["centre_m"] + body["position_m"]
+        self.assertLess(abs(centre - scene.place(parent, numpy.array([[0.1, 0.01, 0]]))[0]).max(), 1e-9)
+        self.assertTrue(numpy.allclose(body["angular_velocity_rad_s"], RAISE @ make_rotation(TILT) @ [0, 3, 0]))
+
+    def test_colliders_of_meshes_and_several_shapes(self):
+        scene, _, _, _ = make_drop(1.0)
+        points, triangles = make_grid_box(numpy.array([0.3, 0.2, 0.1]), 1)
+        corners = points[triangles].reshape(-1, 3)  # each triangle has its own corners, as flat shading has
+        scene.json["meshes"] = [{"primitives": [{"attributes": {"POSITION": scene.add_accessor(corners.astype("f4"), "VEC3")}}]}]
+        plinth = scene.add_node(name="Plinth", mesh=0, translation=[0.9, 0.1, 0], scale=[1, 1, 2])
+        scene.json["nodes"][plinth]["extensions"] = {PHYSICS: {"collider": {"geometry": {"node": plinth}}}}
+        dumbbell = scene.add_node(name="Dumbbell", translation=[-0.5, 1, 0], rotation=TILT, motion={"mass": 2.0})
+        small = scene.add_shape("box", size=[0.1, 0.1, 0.1])
+        for side in (-0.2, 0.2):
+            scene.add_node(dumbbell, translation=[side, 0, 0], shape=small)
+        held = scene.add_node(name="Held", translation=[0, 3, 0], shape=small, motion={"mass": 1, "isKinematic": True})
+        made, banks, _ = self.convert(scene)
+        self.check_place(scene, plinth, points, self.find(made, "Plinth"), banks["Plinth"])
+        self.assertTrue(self.find(made, "Plinth")["fixed"] and self.find(made, "Held")["fixed"])
+        box = numpy.array([[x, y, z] for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (-0.05, 0.05)])
+        both = numpy.concatenate([box + [side, 0, 0] for side in (-0.2, 0.2)])
+        bank = banks["Dumbbell"]
+        self.check_place(scene, dumbbell, both, self.find(made, "Dumbbell"), bank)
+        self.check_place(scene, held, box, self.find(made, "Held"), banks["Held"])
+        self.assertAlmostEqual(bank["mass_kg"], 2.0, 9)
+        across = 2 * (0.1**2 / 6 + 0.2**2)
+        self.assertLess(abs(numpy.sort(numpy.diag(bank["inertia_kg_m2"])) - [2 * 0.1**2 / 6, across, across]).max(), 1e-8)
+        run(BIN / "carillon-render", self.folder / "scene.gltf", "-o", self.folder / "x.wav", "-q")
+
     def test_inertia(self):
         """Of the motion or of the model where the surface can have it; else of the surface."""
         points, triangles = make_grid_box(BAR)
