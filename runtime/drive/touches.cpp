@@ -224,6 +224,7 @@ void Touches::Course::start(double time_s, std::span<const TouchesPose> poses) {
   take_poses(poses);
   for (int i = 0; i < count(); ++i) {
     spots_.forget(i);
+    sounds_.forget(i);
     lasting_.end(scene_, i, events_);
     bodies_[i].is_new = false;
     stirred_[i] = 1;

@@ -7,6 +7,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <array>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -18,6 +19,7 @@
 #include "runtime/acoustics/head/sphere.hpp"
 #include "runtime/acoustics/radiation/gains.hpp"
 #include "runtime/bank/mounting/losses.hpp"
+#include "runtime/bank/surface.hpp"
 #include "runtime/bindings/python/module.hpp"
 #include "runtime/bindings/python/shared_bank.hpp"
 #include "runtime/events/events.hpp"
@@ -31,6 +33,7 @@ namespace {
 namespace py = pybind11;
 
 constexpr py::ssize_t kMaxFrames = 1 << 30, kPiece = 4096;
+constexpr double kFarthestShare = 0.25;  // of the extent, as in scenes: largest distance of a sensor's point from the surface
 
 synth::EffectSet to_effects(const std::vector<std::string>& names) {
   synth::EffectSet effects;
@@ -159,6 +162,10 @@ class Instrument {
     if (point_m) {
       const bank::NearestPlace place = bank.get_tree().find(*point_m);
       if (place.triangle < 0) throw InputError("add_sensor: point_m is not finite or too far away");
+      const auto [low, high] = bank::find_extent(bank.played->vertices_m);
+      if (!(place.distance_m <= kFarthestShare * calc_length(high - low)))
+        throw InputError(fmt::format("add_sensor: point_m is {:.4g} m away from the body; its nearest point is [{:.6g}, {:.6g}, {:.6g}]",
+                                     place.distance_m, place.point_m[0], place.point_m[1], place.point_m[2]));
       settings.triangle = place.triangle;
       settings.barycentric = place.barycentric;
     }

@@ -108,6 +108,10 @@ class SensorsTest(unittest.TestCase):
         found = numpy.linalg.lstsq(numpy.stack(columns, 1), samples[frames], rcond=None)[0]
         return found[:-1].reshape(-1, 2), found[-1]
 
+    def test_a_point_far_from_the_body_is_refused(self):
+        with self.assertRaisesRegex(ValueError, r"point_m is 4\..* m away from the body"):
+            self.read("velocity", 1e-3, point_m=[0.0, 0.0, 5.0])
+
     def test_frequencies_are_those_of_the_beam(self):
         off = self.bank.frequency_hz[self.bending] / self.beam.frequency_hz[: len(self.bending)] - 1
         self.assertLess(numpy.abs(off).max(), 0.01)
