@@ -593,7 +593,7 @@ class Engines(Case):
         with self.assertRaisesRegex(carillon.InputError, "pair, point and normal"):
             touches.step(0.1, one, turn, one, one, pair=numpy.array([[0, -1]], numpy.int32))
         self.assertEqual(touches.counters["steps"], 0)
-        with self.assertRaisesRegex(carillon.InputError, "needs a bank"):
+        with self.assertRaisesRegex(carillon.InputError, "bank: a body that sounds needs one"):
             touches.add(None, 0, mass_kg=1.0, young_pa=1e9, density_kg_m3=1e3, size_m=0.1)
         with self.assertRaises(TypeError):
             carillon.Touches(3)
