@@ -110,7 +110,7 @@ bool HitSounds::Contact::needs_modes() const {
 
 void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, LastingContacts& lasting, TouchesCounters& counters,
                     std::vector<events::Event>& events) {
-  limit_predicted(step, hits);
+  join_predicted(step, hits);
   const auto name = [&](int body) { return step.scene.get_matter(body).name_hash; };
   std::stable_sort(hits.begin(), hits.end(), [&](const FinishedHit& x, const FinishedHit& y) {
     if (x.is_shared != y.is_shared) return y.is_shared;  // impacts may include shared ones
@@ -359,22 +359,21 @@ std::vector<double> HitSounds::calc_rigid_pushes(const StepView& step, std::span
   return pushes;
 }
 
-/// Predicted impulses are of single points. Those of two bodies in a step share their motion: at most the impulses of rigid bodies that are
-/// struck there together.
-void HitSounds::limit_predicted(const StepView& step, std::vector<FinishedHit>& hits) {
+/// Predicted impulses are of single points. Points of two bodies in a step get the impulses of rigid bodies that are struck there together.
+void HitSounds::join_predicted(const StepView& step, std::vector<FinishedHit>& hits) {
   for (std::size_t first = 0; first < hits.size(); ++first) {
     std::vector<FinishedHit*> together;
-    bool is_limited = false;
+    bool is_done = false;
     for (std::size_t i = 0; i < hits.size(); ++i) {
       if (!hits[i].is_predicted || hits[i].a != hits[first].a || hits[i].b != hits[first].b) continue;
-      is_limited = is_limited || i < first;
+      is_done = is_done || i < first;
       together.push_back(&hits[i]);
     }
-    if (is_limited || together.size() < 2) continue;
+    if (is_done || together.size() < 2) continue;
     const std::vector<double> pushes = calc_rigid_pushes(step, std::vector<const FinishedHit*>(together.begin(), together.end()));
     for (std::size_t i = 0; i < together.size(); ++i) {
       FinishedHit& hit = *together[i];
-      const double share = std::min(1.0, pushes[i] / hit.push_n_s);
+      const double share = hit.push_n_s > 0.0 ? pushes[i] / hit.push_n_s : 0.0;
       hit.push_n_s *= share;
       for (Vec3& impulse : hit.impulses_n_s) impulse = share * impulse;
     }

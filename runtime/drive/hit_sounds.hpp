@@ -66,7 +66,7 @@ class HitSounds {
   std::vector<Contact> gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first);
   void sound(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
   static std::vector<double> calc_rigid_pushes(const StepView& step, std::span<const FinishedHit* const> hits);
-  static void limit_predicted(const StepView& step, std::vector<FinishedHit>& hits);
+  static void join_predicted(const StepView& step, std::vector<FinishedHit>& hits);
   bool integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
   impact::Body make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s);
   double keep_ringing(std::span<const int> bodies, const impact::Impact& impact, const std::vector<impact::Body>& before, double touch_s,
