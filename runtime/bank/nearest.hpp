@@ -16,6 +16,10 @@ struct NearestPlace {
   double distance_m = 0.0;     // from the query point
 };
 
+/// Largest distance of a point that is given by hand from the surface, relative to the extent of the body, the diagonal of its box: farther
+/// ones are mistakes, such as of units.
+inline constexpr double kFarthestShare = 0.25;
+
 /// Limit of coordinates: squares must not overflow.
 inline constexpr double kFarthestPointM = 1e100;
 

@@ -226,6 +226,20 @@ void WholeFolder::commit() {
   if (has_before) std::filesystem::remove_all(before, error);
 }
 
+fs::path find_replaceable(const fs::path& folder, const std::function<bool(const fs::path&)>& is_ours, std::string_view what) {
+  fs::path place = fs::absolute(folder).lexically_normal();
+  if (place.filename().empty()) place = place.parent_path();
+  std::error_code error;
+  if (!fs::exists(place, error)) return place;
+  bool is_free = fs::is_directory(place, error);
+  if (is_free)
+    for (const fs::directory_entry& entry : fs::directory_iterator(place, error)) is_free = is_free && is_ours(entry.path());
+  if (!is_free || error)
+    throw InputError(
+        fmt::format("{}: contains other files, and {} is replaced as a whole; give another one with -o", folder.string(), what));
+  return place;
+}
+
 std::string find_extension(const std::filesystem::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });

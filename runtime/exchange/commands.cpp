@@ -34,7 +34,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kMaxGlbBytes = 1ULL << 32, kMaxResultBytes = 1ULL << 36;
+constexpr std::uint64_t kMaxResultBytes = 1ULL << 36;
 
 bool has_results(const fs::path& file) {
   const std::string ending = base::find_extension(file);
@@ -177,13 +177,13 @@ FrfSet make_frfs(const bank::Bank& bank, const ExportWishes& wishes) {
   if (wishes.strike.empty() && wishes.points.empty())
     throw InputError("frequency responses need a struck point and points of response: --strike X,Y,Z --points X,Y,Z ...");
   const bank::Bank played = bank::calc_corrected(bank);
-  std::vector<FrfPoint> points;
-  for (const std::string& word : wishes.points) points.push_back(find_frf_point(played, read_point("--points", word)));
-  FrfPoint struck = wishes.strike.empty() ? points.front() : find_frf_point(played, read_point("--strike", wishes.strike));
+  std::vector<StruckPoint> points;
+  for (const std::string& word : wishes.points) points.push_back(find_struck_point(played, read_point("--points", word)));
+  StruckPoint struck = wishes.strike.empty() ? points.front() : find_struck_point(played, read_point("--strike", wishes.strike));
   if (points.empty()) points.push_back(struck);
   FrfSet set;
   for (std::size_t p = 0; p < points.size(); ++p) set.nodes_m[static_cast<std::int64_t>(p + 1)] = points[p].point_m;
-  const auto same = std::find_if(points.begin(), points.end(), [&](const FrfPoint& point) { return point.point_m == struck.point_m; });
+  const auto same = std::find_if(points.begin(), points.end(), [&](const StruckPoint& point) { return point.point_m == struck.point_m; });
   const auto reference = static_cast<std::int64_t>(same - points.begin() + 1);
   set.nodes_m[reference] = struck.point_m;
   const Motion motion = wishes.quantity == "displacement" ? Motion::kDisplacement
@@ -228,26 +228,12 @@ void export_frfs(const bank::Bank& bank, const ExportWishes& wishes, const std::
   for (const auto& [node, x] : set.nodes_m) fmt::print(notes, "node {:<5}{:.5g}, {:.5g}, {:.5g} m\n", node, x[0], x[1], x[2]);
 }
 
-/// The folder: new, or replaced if it holds only a scene of an earlier call.
-fs::path find_scene_folder(const fs::path& out) {
-  fs::path place = fs::absolute(out).lexically_normal();
-  if (place.filename().empty()) place = place.parent_path();
-  std::error_code error;
-  if (!fs::exists(place, error)) return place;
-  bool is_ours = fs::is_directory(place, error);
-  if (is_ours)
-    for (const fs::directory_entry& entry : fs::directory_iterator(place, error))
-      is_ours = is_ours && (entry.path().filename() == kSceneFile || base::find_extension(entry.path()) == ".hdf");
-  if (!is_ours || error)
-    throw InputError(
-        fmt::format("{}: contains other files, and the folder of a scene is replaced as a whole; give another one with -o", out.string()));
-  return place;
-}
-
 void import_scene(const ImportWishes& wishes, const material::Material* material) {
   if (!wishes.unit.empty()) throw InputError("--unit is for modes of other solvers; glTF is in metres");
   if (wishes.model) throw InputError("--model chooses one model for a bank, and -o names a folder for the whole scene; leave one out");
-  base::WholeFolder folder(find_scene_folder(wishes.out));
+  base::WholeFolder folder(base::find_replaceable(
+      wishes.out, [](const fs::path& entry) { return entry.filename() == kSceneFile || base::find_extension(entry) == ".hdf"; },
+      "the folder of a scene"));
   const GltfScene made = write_gltf_scene(wishes.file, make_reading(wishes, material), folder.path());
   for (const std::string& warning : made.warnings)
     fmt::print(stderr, "carillon-bank: warning: {}: {}\n", base::printable(wishes.file.string()), warning);
@@ -369,8 +355,9 @@ void run_silent(const SilentWishes& wishes) {
   body.young_modulus_pa = wishes.young_modulus_pa.value_or(body.young_modulus_pa);
   body.poisson_ratio = wishes.poisson_ratio.value_or(body.poisson_ratio);
   bank::Bank bank;
+  std::vector<std::string> warnings;  // of given centres and moments, which this command has none of
   try {
-    bank = make_silent_bank(body);
+    bank = make_silent_bank(body, warnings);
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", wishes.body, error.what()));
   }

@@ -1,20 +1,13 @@
 // Source: Ewins 2000, "Modal Testing", 2.4 (viscous damping) and 2.10 (free bodies).
 #include "runtime/exchange/frf.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
 
-#include "runtime/bank/nearest.hpp"
-#include "runtime/bank/surface.hpp"
-#include "runtime/base/error.hpp"
-
 namespace carillon::exchange {
 namespace {
 
-constexpr double kFarthestFrfPoint = 0.25;  // of the body's extent
 constexpr std::int64_t kFreeModes = 6;
 
 /// Acceleration along `response_axis` per force along `reference_axis` of the rigid body [1/kg].
@@ -30,17 +23,6 @@ double calc_rigid(const bank::Bank& bank, const Vec3& response_m, const Vec3& re
 
 }  // namespace
 
-FrfPoint find_frf_point(const bank::Bank& bank, const Vec3& point_m) {
-  const bank::NearestPlace found = bank::find_nearest(bank, point_m);
-  const auto [low, high] = bank::find_extent(bank.vertices_m);
-  if (found.triangle < 0 || !(found.distance_m <= kFarthestFrfPoint * norm(high - low)))
-    throw InputError(fmt::format("[{:g}, {:g}, {:g}] is not near the surface; give metres", point_m[0], point_m[1], point_m[2]));
-  FrfPoint point{.point_m = found.point_m, .inward = -1.0 * calc_unit(bank::calc_normal(bank.vertices_m, bank.triangles[found.triangle]))};
-  const std::vector<double> shapes = bank::calc_shapes(bank, found.triangle, found.barycentric);
-  for (std::size_t m = 0; m < bank.mode_count(); ++m) point.shape_kg.push_back({shapes[3 * m], shapes[3 * m + 1], shapes[3 * m + 2]});
-  return point;
-}
-
 Vec3 find_axis(int direction) {
   Vec3 axis{};
   if (const int k = std::abs(direction); k >= 1 && k <= 3) axis[static_cast<std::size_t>(k - 1)] = direction > 0 ? 1.0 : -1.0;
@@ -54,14 +36,14 @@ int find_direction(const Vec3& along) {
   return along[k] < 0.0 ? -static_cast<int>(k) - 1 : static_cast<int>(k) + 1;
 }
 
-std::vector<std::complex<double>> calc_frf(const bank::Bank& bank, const FrfPoint& response, const Vec3& response_axis,
-                                           const FrfPoint& reference, const Vec3& reference_axis, Motion motion,
+std::vector<std::complex<double>> calc_frf(const bank::Bank& bank, const StruckPoint& response, const Vec3& response_axis,
+                                           const StruckPoint& reference, const Vec3& reference_axis, Motion motion,
                                            const std::vector<double>& freq_hz) {
   const double rigid =
       bank.counts.rigid_modes == kFreeModes ? calc_rigid(bank, response.point_m, response_axis, reference.point_m, reference_axis) : 0.0;
   std::vector<double> residue;
   for (std::size_t m = 0; m < bank.mode_count(); ++m)
-    residue.push_back(dot(response.shape_kg[m], response_axis) * dot(reference.shape_kg[m], reference_axis));
+    residue.push_back(dot(response.shape[m], response_axis) * dot(reference.shape[m], reference_axis));
   std::vector<std::complex<double>> values;
   values.reserve(freq_hz.size());
   for (const double hz : freq_hz) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/exchange/struck_point.hpp"
 
 namespace carillon::exchange {
 
@@ -30,15 +31,6 @@ struct FrfSet {
   std::vector<Frf> frfs;
 };
 
-/// A point of a body's surface.
-struct FrfPoint {
-  Vec3 point_m{}, inward{};      // mesh axes; unit normal
-  std::vector<Vec3> shape_kg{};  // (m) mass-normalised [kg^-1/2]
-};
-
-/// Nearest point of the surface. Throws InputError for a place that is far from it.
-FrfPoint find_frf_point(const bank::Bank& bank, const Vec3& point_m);
-
 /// Unit vector of a direction of universal files; zero for those that are not +-1, 2, 3.
 Vec3 find_axis(int direction);
 /// The axis nearest to a vector.
@@ -47,8 +39,8 @@ int find_direction(const Vec3& along);
 /// (L) Sum over the modes of shape at the response times shape at the reference over lambda - omega^2 + 2 i d omega, times (i omega)^k, and
 /// the motion of the rigid body where the bank is of a free one (six rigid modes). Frequencies and decays are those of `bank`.
 /// Frequencies above 0.
-std::vector<std::complex<double>> calc_frf(const bank::Bank& bank, const FrfPoint& response, const Vec3& response_axis,
-                                           const FrfPoint& reference, const Vec3& reference_axis, Motion motion,
+std::vector<std::complex<double>> calc_frf(const bank::Bank& bank, const StruckPoint& response, const Vec3& response_axis,
+                                           const StruckPoint& reference, const Vec3& reference_axis, Motion motion,
                                            const std::vector<double>& freq_hz);
 
 /// Universal file in SI units: datasets 164, 2411 (the nodes) and of each function 58 (ASCII, double precision). The frequencies have to be

@@ -42,12 +42,11 @@ namespace {
 using gltf::Component;
 
 constexpr std::size_t kMaxFields = 1000, kMaxListed = 10'000'000;
-constexpr double kFreqTolerance = 1e-6;     // relative error of a frequency in float, through a sum of squares
-constexpr double kStepTolerance = 0.02;     // steps of a shape: rounding of an integer stored as float
-constexpr double kDecayTolerance = 1e-5;    // relative error of a decay in float against its law
-constexpr double kScaleTolerance = 1e-4;    // relative difference between the axes of a node
-constexpr double kInertiaTolerance = 0.05;  // largest relative difference about any axis
-constexpr double kDensityTolerance = 0.1;   // of mass over volume from the material, in a warning
+constexpr double kFreqTolerance = 1e-6;    // relative error of a frequency in float, through a sum of squares
+constexpr double kStepTolerance = 0.02;    // steps of a shape: rounding of an integer stored as float
+constexpr double kDecayTolerance = 1e-5;   // relative error of a decay in float against its law
+constexpr double kScaleTolerance = 1e-4;   // relative difference between the axes of a node
+constexpr double kDensityTolerance = 0.1;  // of mass over volume from the material, in a warning
 constexpr const char* kChanged = "was changed since carillon-bank wrote it; --plain reads the extension alone";
 
 /// Model in the extension.
@@ -353,38 +352,21 @@ class Reader {
     std::optional<base::Object> own = model.object_if("massProperties");
     const double cube = std::pow(factor, 3);
     const double model_kg = own ? cube * own->number("mass", base::kPositive) : bank.material.density_kg_m3 * solid.volume_m3;
-    rigid.volume_m3 = solid.volume_m3;
     rigid.mass_kg = placement.mass_kg.value_or(model_kg);
-    rigid.centre_m = solid.centre_m;
-    if (placement.centre_m)
-      rigid.centre_m = placement.scale * *placement.centre_m;
-    else if (own)
-      rigid.centre_m = placement.scale * Vec3(own->numbers_or<3>("centerOfMass", {0, 0, 0}));
+    std::optional<Vec3> centre = placement.centre_m;
+    if (!centre && own) centre = own->numbers_or<3>("centerOfMass", {0, 0, 0});
+    if (centre) centre = placement.scale * *centre;
     std::optional<std::array<double, 9>> inertia = placement.inertia_kg_m2;
     if (!inertia && own && own->has("inertiaDiagonal")) {
       inertia = read_inertia(*own);
       for (double& x : *inertia) x *= cube * factor * factor * rigid.mass_kg / model_kg;
     }
-    settle_inertia(inertia, solid, bank);
+    settle_rigid(centre, inertia, solid, bank, warnings_);
     const double density = rigid.mass_kg / solid.volume_m3;
     if (std::abs(density / bank.material.density_kg_m3 - 1.0) > kDensityTolerance)
       warnings_.push_back(fmt::format("its mass over its volume is {:.5g} kg/m^3, and the density of its material {:.5g}: the mass is kept",
                                       density, bank.material.density_kg_m3));
     bank.material.density_kg_m3 = density;
-  }
-
-  void settle_inertia(const std::optional<std::array<double, 9>>& given, const Solid& solid, bank::Bank& bank) {
-    bank::RigidBody& rigid = bank.rigid;
-    const auto [low, high] = bank::find_extent(bank.vertices_m);
-    bool is_inside = true;
-    for (std::size_t c = 0; c < 3; ++c) is_inside = is_inside && rigid.centre_m[c] > low[c] && rigid.centre_m[c] < high[c];
-    if (!is_inside) {
-      warnings_.push_back("its centre of mass lies outside its surface; that of the surface, filled evenly, is taken");
-      rigid.centre_m = solid.centre_m;
-    }
-    for (std::size_t i = 0; i < 9; ++i) rigid.inertia_kg_m2[i] = rigid.mass_kg / solid.volume_m3 * solid.inertia_m5[i];
-    if (given && !take_inertia(*given, rigid.inertia_kg_m2))
-      warnings_.push_back("its moments of inertia contradict its surface and its mass; those of the surface, filled evenly, are taken");
   }
 
   /// Multipoles of the modes in the order `order`, of which the decays lose what radiation adds. `size`: of the body relative to the
@@ -537,24 +519,6 @@ double require_scale(gltf::Graph& graph, std::size_t node) {
                            "is mirrored, or not scaled by the same along all axes, which changes the modes; apply the scale, and compute "
                            "them again");
   return *scale;
-}
-
-bool take_inertia(const std::array<double, 9>& given, std::array<double, 9>& of_surface) {
-  const Eigen::Map<const Eigen::Matrix3d> tensor(given.data());  // symmetric
-  Eigen::Map<Eigen::Matrix3d> surface(of_surface.data());
-  const Eigen::Matrix3d about = 0.5 * tensor.trace() * Eigen::Matrix3d::Identity() - tensor;
-  const Eigen::LLT<Eigen::Matrix3d> root(surface);
-  if (!tensor.allFinite() || root.info() != Eigen::Success) return false;
-  // Moments about all axes at once: the eigenvalues of L^-1 (given - surface) L^-T.
-  Eigen::Matrix3d difference = tensor - surface;
-  root.matrixL().solveInPlace(difference);
-  difference.transposeInPlace();
-  root.matrixL().solveInPlace(difference);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(0.5 * (difference + difference.transpose()), Eigen::EigenvaluesOnly);
-  const bool is_possible = Eigen::LLT<Eigen::Matrix3d>(about).info() == Eigen::Success;
-  if (!is_possible || !(solver.eigenvalues().cwiseAbs().maxCoeff() <= kInertiaTolerance)) return false;
-  surface = tensor;
-  return true;
 }
 
 Placement read_motion(base::Object& motion) {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -21,6 +22,8 @@ namespace carillon::exchange {
 
 inline constexpr const char* kExtension = "KHR_audio_rigid_bodies";
 inline constexpr const char* kPhysicsExtension = "KHR_physics_rigid_bodies";
+
+inline constexpr std::uint64_t kMaxGlbBytes = 1ULL << 32;  // of a file that is read
 
 struct GlbOptions {
   std::string name = "body";  // name of mesh, node and model
@@ -59,10 +62,6 @@ ModelBank read_model(gltf::File& file, std::size_t number, const Placement& plac
 
 /// The motion of a node, for Placement. `motion`: as in KHR_physics_rigid_bodies. A mass of 0, which means infinity, is left out.
 Placement read_motion(base::Object& motion);
-
-/// Takes a tensor in place of that of a surface filled evenly, unless no solid has it or it differs by more than 5 % about any axis. False
-/// if it is not taken.
-bool take_inertia(const std::array<double, 9>& given, std::array<double, 9>& of_surface);
 
 /// Scale of a node in the world. Throws InputError with its path for one that modes cannot have.
 double require_scale(gltf::Graph& graph, std::size_t node);

@@ -57,12 +57,9 @@ double read_positive(base::Object& owner, const char* key, double fallback, doub
   return value;
 }
 
-Surface read_geometry(gltf::File& file, gltf::Graph& graph, base::Object& geometry) {
+Surface read_geometry(gltf::File& file, gltf::Graph& graph, std::vector<base::Object>& shapes, base::Object& geometry) {
   if (geometry.has("shape") == geometry.has("node")) geometry.fail("", "must have one of \"shape\" and \"node\"; give one of them");
   if (const auto node = gltf::find_index(geometry, "node", graph.nodes.size(), "node")) return read_mesh(file, graph.nodes[*node]);
-  std::optional<base::Object> extensions = file.root().object_if("extensions");
-  std::optional<base::Object> own_shapes = extensions ? extensions->object_if(kShapesExtension) : std::nullopt;
-  std::vector<base::Object> shapes = own_shapes ? own_shapes->objects("shapes") : std::vector<base::Object>();
   base::Object& shape = shapes[*gltf::find_index(geometry, "shape", shapes.size(), "shape")];
   const std::string type = shape.choice("type", {"box", "sphere", "cylinder", "capsule"});
   base::Object own = shape.object(type);

@@ -47,7 +47,6 @@ struct Body {
   std::optional<GltfContact> restitution, friction;  // of a physics material
   std::vector<std::optional<std::size_t>> kind{};    // physics material and acoustic surface, to compare
   Eigen::Vector3d place = Eigen::Vector3d::Zero();   // z up
-  double lowest_m = 0.0;                             // of its surface, at the start
 };
 
 struct KnownBank {
@@ -231,6 +230,16 @@ class SceneReader {
     return placement;
   }
 
+  /// Part of the key of a bank.
+  static std::string describe_mass(const Placement& placement) {
+    std::string key;
+    if (placement.mass_kg) key += fmt::format(" m {:.11e}", *placement.mass_kg);
+    if (const auto& c = placement.centre_m) key += fmt::format(" c {:.9e} {:.9e} {:.9e}", (*c)[0], (*c)[1], (*c)[2]);
+    if (placement.inertia_kg_m2)
+      for (const double x : *placement.inertia_kg_m2) key += fmt::format(" {:.9e}", x);
+    return key;
+  }
+
   static double round_scale(double scale) { return std::strtod(fmt::format("{:.11e}", scale).c_str(), nullptr); }
 
   void make_sounding(Body& body) {
@@ -241,11 +250,7 @@ class SceneReader {
     Placement placement = read_placement(body, linear, place, rotation);
     placement.scale = scale;
     std::string key = fmt::format("model {} {}", *body.model, scale);
-    if (placement.mass_kg) key += fmt::format(" m {:.11e}", *placement.mass_kg);
-    if (placement.centre_m)
-      key += fmt::format(" c {:.9e} {:.9e} {:.9e}", (*placement.centre_m)[0], (*placement.centre_m)[1], (*placement.centre_m)[2]);
-    if (placement.inertia_kg_m2)
-      for (const double x : *placement.inertia_kg_m2) key += fmt::format(" {:.9e}", x);
+    key += describe_mass(placement);
     auto found = banks_.find(key);
     if (found == banks_.end()) {
       ModelBank model = read_model(file_, *body.model, placement, *reading_);
@@ -258,8 +263,6 @@ class SceneReader {
     body.entry.set("bank", found->second.file);
     set_pose(body, rotation, place);
     const KnownBank& bank = found->second;
-    body.lowest_m = std::numeric_limits<double>::infinity();
-    for (const Vec3& corner : bank.corners) body.lowest_m = std::min(body.lowest_m, raise(rotation * to_eigen(corner) + place)[2]);
     compare_colliders(body, bank, linear, place, scale);
     if (audio_[n]->has("gain")) {
       const double gain = audio_[n]->number("gain");
@@ -315,16 +318,13 @@ class SceneReader {
       warn(n, fmt::format("its motion has no mass; {:g} kg/m^3 are taken", silent.density_kg_m3));
     silent.origin = fmt::format("{}, node {}", file_.name(), n);
     std::string key = fmt::format("silent {} {} {}", silent.young_modulus_pa, silent.poisson_ratio, silent.density_kg_m3);
-    if (silent.mass_kg) key += fmt::format(" m {:.11e}", *silent.mass_kg);
-    if (silent.centre_m) key += fmt::format(" c {:.9e} {:.9e} {:.9e}", (*silent.centre_m)[0], (*silent.centre_m)[1], (*silent.centre_m)[2]);
-    if (silent.inertia_kg_m2)
-      for (const double x : *silent.inertia_kg_m2) key += fmt::format(" {:.9e}", x);
+    key += describe_mass(placement);
     for (const Vec3& v : silent.surface.vertices_m) key += fmt::format(" {:.9e} {:.9e} {:.9e}", v[0] + 0.0, v[1] + 0.0, v[2] + 0.0);
     auto found = banks_.find(key);
     if (found == banks_.end()) {
       std::vector<std::string> warnings;
       try {
-        const bank::Bank bank = make_silent_bank(silent, &warnings);
+        const bank::Bank bank = make_silent_bank(silent, warnings);
         found = banks_.emplace(key, put_bank("silent", bank)).first;
       } catch (const InputError& error) {
         graph_.nodes[n].fail("", error.what());
@@ -333,8 +333,6 @@ class SceneReader {
     }
     body.entry.set("bank", found->second.file);
     set_pose(body, rotation, place);
-    body.lowest_m = std::numeric_limits<double>::infinity();
-    for (const Vec3& corner : found->second.corners) body.lowest_m = std::min(body.lowest_m, raise(rotation * to_eigen(corner) + place)[2]);
     // In the draft only models sound, also by their acceleration.
     body.entry.set("effects", base::Json::array());
     return true;
@@ -378,7 +376,7 @@ class SceneReader {
   Surface read_shape(std::size_t n) {
     base::Object geometry = open_geometry(n);
     if (geometry.boolean_or("convexHull", false) && geometry.has("node")) warn(n, "its collider is the mesh itself, not its convex hull");
-    return read_geometry(file_, graph_, geometry);
+    return read_geometry(file_, graph_, shapes_, geometry);
   }
 
   /// Adds the shape of a collider, in metres in a frame.

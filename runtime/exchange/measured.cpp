@@ -193,12 +193,12 @@ std::vector<MeasuredMode> find_modes(const Receptances& all, const std::vector<d
 
 /// (functions) Points and axes of a function on the bank.
 struct PlacedFrf {
-  const FrfPoint *response, *reference;
+  const StruckPoint *response, *reference;
   Vec3 response_axis, reference_axis;
 };
 
 /// All functions on the bank, or why not.
-std::string place(const bank::Bank& bank, const FrfSet& measured, std::map<std::int64_t, FrfPoint>& points,
+std::string place(const bank::Bank& bank, const FrfSet& measured, std::map<std::int64_t, StruckPoint>& points,
                   std::vector<PlacedFrf>& placed) {
   for (std::size_t k = 0; k < measured.frfs.size(); ++k) {
     const Frf& frf = measured.frfs[k];
@@ -207,7 +207,7 @@ std::string place(const bank::Bank& bank, const FrfSet& measured, std::map<std::
       const auto found = measured.nodes_m.find(node);
       if (found == measured.nodes_m.end()) return fmt::format("the file has no position (dataset 15 or 2411) of node {}", node);
       try {
-        points.emplace(node, find_frf_point(bank, found->second));
+        points.emplace(node, find_struck_point(bank, found->second));
       } catch (const InputError& error) {
         return fmt::format("node {}: {}", node, error.what());
       }
@@ -227,7 +227,7 @@ void calc_pairs(const bank::Bank& played, const std::vector<PlacedFrf>& placed, 
   for (std::size_t i = 0; i < rows; ++i) {
     std::vector<double> own;
     for (const PlacedFrf& frf : placed)
-      own.push_back(dot(frf.response->shape_kg[modes[i]], frf.response_axis) * dot(frf.reference->shape_kg[modes[i]], frf.reference_axis));
+      own.push_back(dot(frf.response->shape[modes[i]], frf.response_axis) * dot(frf.reference->shape[modes[i]], frf.reference_axis));
     for (std::size_t j = 0; j < peaks; ++j) {
       const MeasuredMode& peak = result.peaks[j];
       MeasuredPair& pair = all[i * peaks + j] = {
@@ -296,7 +296,7 @@ MeasuredComparison compare_measured(const bank::Bank& played, const FrfSet& meas
     result.level_db.push_back(10.0 * std::log10(std::max(power[i] / static_cast<double>(measured.frfs.size()), 1e-300)));
   }
   result.peaks = find_modes(all, power);
-  std::map<std::int64_t, FrfPoint> points;
+  std::map<std::int64_t, StruckPoint> points;
   std::vector<PlacedFrf> placed;
   result.unknown = place(played, measured, points, placed);
   if (!result.unknown.empty()) placed.clear();

@@ -45,8 +45,7 @@ struct MeasuredComparison {
 
 /// Compares the `most` lowest modes of the bank within the measured band, as played (corrected, in air), with the peaks. Pairs have the
 /// least sum of (cents / `within_cents`)^2 + 1 - MAC, and lie within that distance. `draws`: with bank_hz, bank_db. Throws InputError
-/// "name:
-/// ...".
+/// "name: ...".
 MeasuredComparison compare_measured(const bank::Bank& played, const FrfSet& measured, std::size_t most, double within_cents, bool draws,
                                     const std::string& name);
 

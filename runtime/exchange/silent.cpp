@@ -12,12 +12,10 @@
 #include <numbers>
 #include <utility>
 
-#include "runtime/bank/surface.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/json.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/used_points.hpp"
-#include "runtime/exchange/glb.hpp"
 #include "runtime/exchange/solid.hpp"
 
 namespace carillon::exchange {
@@ -184,7 +182,7 @@ Surface parse_obj_surface(std::string_view bytes, const std::string& name) {
   return surface;
 }
 
-bank::Bank make_silent_bank(const SilentBody& body, std::vector<std::string>* warnings) {
+bank::Bank make_silent_bank(const SilentBody& body, std::vector<std::string>& warnings) {
   if (body.surface.triangles.size() < 4) throw InputError("its surface has fewer than four triangles; give a closed surface");
   bank::Bank bank;
   bank.vertices_m = body.surface.vertices_m;
@@ -192,27 +190,11 @@ bank::Bank make_silent_bank(const SilentBody& body, std::vector<std::string>* wa
   const Solid solid = calc_solid(bank.vertices_m, bank.triangles);
   if (!(solid.volume_m3 > 0.0))
     throw InputError("its surface encloses no volume, or faces inward; give a closed surface that faces outward");
-  bank::RigidBody& rigid = bank.rigid;
-  rigid.volume_m3 = solid.volume_m3;
-  rigid.mass_kg = body.mass_kg.value_or(body.density_kg_m3 * solid.volume_m3);
-  const auto warn = [&](const char* text) {
-    if (warnings != nullptr) warnings->emplace_back(text);
-  };
-  rigid.centre_m = solid.centre_m;
-  if (body.centre_m) {
-    const auto [low, high] = bank::find_extent(bank.vertices_m);
-    bool is_inside = true;
-    for (std::size_t c = 0; c < 3; ++c) is_inside = is_inside && (*body.centre_m)[c] > low[c] && (*body.centre_m)[c] < high[c];
-    if (is_inside)
-      rigid.centre_m = *body.centre_m;
-    else
-      warn("its centre of mass lies outside its surface; that of the surface, filled evenly, is taken");
-  }
-  for (std::size_t i = 0; i < 9; ++i) rigid.inertia_kg_m2[i] = rigid.mass_kg / solid.volume_m3 * solid.inertia_m5[i];
-  if (body.inertia_kg_m2 && !take_inertia(*body.inertia_kg_m2, rigid.inertia_kg_m2))
-    warn("its moments of inertia contradict its surface and its mass; those of the surface, filled evenly, are taken");
-  bank.material = {
-      .young_modulus_pa = body.young_modulus_pa, .poisson_ratio = body.poisson_ratio, .density_kg_m3 = rigid.mass_kg / solid.volume_m3};
+  bank.rigid.mass_kg = body.mass_kg.value_or(body.density_kg_m3 * solid.volume_m3);
+  settle_rigid(body.centre_m, body.inertia_kg_m2, solid, bank, warnings);
+  bank.material = {.young_modulus_pa = body.young_modulus_pa,
+                   .poisson_ratio = body.poisson_ratio,
+                   .density_kg_m3 = bank.rigid.mass_kg / solid.volume_m3};
   bank.counts = {.nodes = static_cast<std::int64_t>(bank.vertex_count()), .tets = 1, .components = 1, .rigid_modes = 6};
   bank.complete = false;
   bank.element = "analytic";

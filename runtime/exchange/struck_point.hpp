@@ -1,4 +1,4 @@
-// A point of the surface that is struck.
+// A point of the surface that is struck, or where motion is read.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,11 @@
 namespace carillon::exchange {
 
 struct StruckPoint {
-  Vec3 point_m{}, inward{};
-  std::vector<double> velocity{};  // (m) modal velocity after a blow of 1 N s along `inward` [m kg^1/2 / s]
+  Vec3 point_m{}, inward{};   // mesh axes; unit normal, zero where the triangle has no area
+  std::vector<Vec3> shape{};  // (m) mass-normalised [kg^-1/2]
+
+  /// (m) Modal velocity after a blow of 1 N s along `inward` [m kg^1/2 / s].
+  std::vector<double> calc_velocities() const;
 };
 
 /// Nearest point of the surface. Throws InputError for a place that is far from it.

@@ -88,7 +88,8 @@ std::vector<Vec3> choose_points(const bank::Bank& bank, const FaustOptions& opti
 Place make_place(const bank::Bank& bank, const Vec3& point_m) {
   const StruckPoint struck = find_struck_point(bank, point_m);
   Place place{.point_m = struck.point_m};
-  for (std::size_t m = 0; m < bank.mode_count(); ++m) place.gain.push_back(bank.radiation_gain[m] * struck.velocity[m]);
+  const std::vector<double> velocities = struck.calc_velocities();
+  for (std::size_t m = 0; m < bank.mode_count(); ++m) place.gain.push_back(bank.radiation_gain[m] * velocities[m]);
   return place;
 }
 

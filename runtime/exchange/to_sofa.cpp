@@ -146,7 +146,7 @@ struct Line {
 std::vector<Line> calc_modes(const bank::Bank& bank, const SofaOptions& options, const std::vector<Vec3>& place_m) {
   const radiation::Transfers transfers(bank);
   std::vector<double> amplitude(bank.mode_count(), 1.0);
-  if (options.strike_m) amplitude = find_struck_point(bank, *options.strike_m).velocity;
+  if (options.strike_m) amplitude = find_struck_point(bank, *options.strike_m).calc_velocities();
   std::vector<Line> lines(bank.mode_count());
   std::vector<std::int32_t> modes(bank.mode_count());
   std::iota(modes.begin(), modes.end(), 0);

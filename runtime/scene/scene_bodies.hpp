@@ -16,10 +16,9 @@
 namespace carillon::scene {
 
 inline constexpr double kLongestS = 3600.0;
-inline constexpr double kFarthestShare = 0.25;  // largest distance of a point from the surface, share of the body's extent
-inline constexpr double kRoughestM = 1e-3;      // larger heights belong to the shape
-inline constexpr double kSoftestPa = 100.0;     // a jelly
-inline constexpr double kStiffestPa = 1e13;     // ten times diamond
+inline constexpr double kRoughestM = 1e-3;   // larger heights belong to the shape
+inline constexpr double kSoftestPa = 100.0;  // a jelly
+inline constexpr double kStiffestPa = 1e13;  // ten times diamond
 
 using base::read_vector;
 using base::read_within;

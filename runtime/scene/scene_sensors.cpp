@@ -76,7 +76,7 @@ synth::SensorSettings locate_sensor(const Scene& scene, const SceneSensor& senso
       low[k] = std::min(low[k], vertex[k]);
       high[k] = std::max(high[k], vertex[k]);
     }
-  if (nearest.triangle < 0 || !(nearest.distance_m <= kFarthestShare * calc_length(high - low)))
+  if (nearest.triangle < 0 || !(nearest.distance_m <= bank::kFarthestShare * calc_length(high - low)))
     throw InputError(
         fmt::format("{}: \"point_m\" is {:.4g} m away from \"{}\"; its nearest point is [{:.6g}, {:.6g}, {:.6g}] in metres of the mesh",
                     sensor.place, nearest.distance_m, body.name, nearest.point_m[0], nearest.point_m[1], nearest.point_m[2]));

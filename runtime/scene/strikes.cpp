@@ -47,7 +47,7 @@ class Finder {
 void find_nearest_place(const Finder& finder, const SceneStrike& strike, const std::string& name, events::Impulse& impulse) {
   const bank::NearestPlace nearest = finder.find(*strike.point_m);
   if (nearest.triangle < 0) throw InputError(fmt::format("{}: \"point_m\" is too far away; its numbers are too large", strike.place));
-  if (!(nearest.distance_m <= kFarthestShare * finder.get_extent_m())) {
+  if (!(nearest.distance_m <= bank::kFarthestShare * finder.get_extent_m())) {
     throw InputError(
         fmt::format("{}: \"point_m\" is {:.4g} m away from \"{}\"; its nearest point is [{:.6g}, {:.6g}, {:.6g}] in metres of the mesh",
                     strike.place, nearest.distance_m, name, nearest.point_m[0], nearest.point_m[1], nearest.point_m[2]));

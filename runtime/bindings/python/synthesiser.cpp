@@ -33,7 +33,6 @@ namespace {
 namespace py = pybind11;
 
 constexpr py::ssize_t kMaxFrames = 1 << 30, kPiece = 4096;
-constexpr double kFarthestShare = 0.25;  // of the extent, as in scenes: largest distance of a sensor's point from the surface
 
 synth::EffectSet to_effects(const std::vector<std::string>& names) {
   synth::EffectSet effects;
@@ -163,7 +162,7 @@ class Instrument {
       const bank::NearestPlace place = bank.get_tree().find(*point_m);
       if (place.triangle < 0) throw InputError("add_sensor: point_m is not finite or too far away");
       const auto [low, high] = bank::find_extent(bank.played->vertices_m);
-      if (!(place.distance_m <= kFarthestShare * calc_length(high - low)))
+      if (!(place.distance_m <= bank::kFarthestShare * calc_length(high - low)))
         throw InputError(fmt::format("add_sensor: point_m is {:.4g} m away from the body; its nearest point is [{:.6g}, {:.6g}, {:.6g}]",
                                      place.distance_m, place.point_m[0], place.point_m[1], place.point_m[2]));
       settings.triangle = place.triangle;

@@ -82,7 +82,9 @@ class Maker {
   }
 
   SampleSet run() {
-    const fs::path place = find_place();
+    const fs::path place = base::find_replaceable(
+        options_->folder, [](const fs::path& entry) { return entry.filename() == kSampleFolder || base::find_extension(entry) == ".sfz"; },
+        "an instrument folder");
     SampleSet set;
     strike_all(set);
     base::WholeFolder whole(place);
@@ -97,22 +99,6 @@ class Maker {
   }
 
  private:
-  /// The folder: new, or replaced if it holds only an instrument of an earlier call.
-  fs::path find_place() const {
-    fs::path place = fs::absolute(options_->folder).lexically_normal();
-    if (place.filename().empty()) place = place.parent_path();
-    std::error_code error;
-    if (!fs::exists(place, error)) return place;
-    bool is_ours = fs::is_directory(place, error);
-    if (is_ours)
-      for (const fs::directory_entry& entry : fs::directory_iterator(place, error))
-        is_ours = is_ours && (entry.path().filename() == kSampleFolder || base::find_extension(entry.path()) == ".sfz");
-    if (!is_ours || error)
-      throw InputError(fmt::format("{}: contains other files, and an instrument folder is replaced as a whole; give another one with -o",
-                                   options_->folder.string()));
-    return place;
-  }
-
   void check() const {
     const auto require = [](bool is_so, const std::string& message) {
       if (!is_so) throw InputError(message);

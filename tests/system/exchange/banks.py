@@ -27,6 +27,11 @@ def make_bank(folder, name, body, **job):
     return folder / f"{name}.hdf"
 
 
+def make_radiating_plate(folder):
+    plate = {"shape": "plate", "length_m": 0.3, "width_m": 0.2, "thickness_m": 0.01, "nodes": 1000}
+    return make_bank(folder, "plate", plate, material="aluminium", band_hz=[100, 4000], radiation="bem")
+
+
 def take_modes(folder, name, count):
     """A copy of a fixture with its lowest modes alone, that may be changed."""
     run(BIN / "carillon-bank", "edit", fixtures.get(name), name, "--modes", count, "--keep", "lowest", cwd=folder)

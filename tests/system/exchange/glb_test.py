@@ -7,7 +7,6 @@ Finds the programs in $CARILLON_BIN_DIR.
 import json
 import pathlib
 import struct
-import subprocess
 import tempfile
 import unittest
 
@@ -47,28 +46,6 @@ class Glb:
         assert view["byteOffset"] % kind.itemsize == 0 and accessor["count"] * width * kind.itemsize <= view["byteLength"]
         values = numpy.frombuffer(self.binary, kind, accessor["count"] * width, view["byteOffset"])
         return values.reshape(-1, width) if width > 1 else values
-
-
-# Errors and warnings of Khronos' validator, an npm package; exit code 3 if it is not on NODE_PATH.
-VALIDATE = """
-let validator;
-try { validator = require("gltf-validator"); } catch { process.exit(3); }
-const bytes = new Uint8Array(require("fs").readFileSync(process.argv[1]));
-validator.validateBytes(bytes).then((found) => console.log(JSON.stringify(found)));
-"""
-
-
-def check_by_validator(test, file):
-    try:
-        done = subprocess.run(["node", "-e", VALIDATE, file], capture_output=True, text=True)
-    except FileNotFoundError:
-        test.skipTest("node is not installed")
-    if done.returncode == 3:
-        test.skipTest("gltf-validator is not on NODE_PATH")
-    test.assertEqual(done.returncode, 0, done.stderr)
-    found = json.loads(done.stdout)
-    test.assertEqual((found["issues"]["numErrors"], found["issues"]["numWarnings"]), (0, 0), found["issues"]["messages"])
-    test.assertGreater(found["info"]["totalVertexCount"], 0)
 
 
 class GlbTest(unittest.TestCase):
@@ -195,9 +172,6 @@ class GlbTest(unittest.TestCase):
             self.assertIn(said, done.stderr)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
             self.assertFalse((self.folder / "x.glb").exists() or (self.folder / "x.hdf").exists())
-
-    def test_the_validator_has_no_complaint(self):
-        check_by_validator(self, self.folder / "bowl.glb")
 
 
 if __name__ == "__main__":

@@ -15,8 +15,8 @@ import h5py
 import jsonschema
 import numpy
 
-from banks import BIN, calc_db, hear_modes, make_bank, run
-from glb_test import Glb, check_by_validator
+from banks import BIN, calc_db, hear_modes, make_radiating_plate, run
+from glb_test import Glb
 
 
 class MultipolesTest(unittest.TestCase):
@@ -24,8 +24,7 @@ class MultipolesTest(unittest.TestCase):
     def setUpClass(cls):
         cls.place = tempfile.TemporaryDirectory()
         cls.folder = pathlib.Path(cls.place.name)
-        plate = {"shape": "plate", "length_m": 0.3, "width_m": 0.2, "thickness_m": 0.01, "nodes": 1000}
-        cls.bank = make_bank(cls.folder, "plate", plate, material="aluminium", band_hz=[100, 4000], radiation="bem")
+        cls.bank = make_radiating_plate(cls.folder)
         run(BIN / "carillon-bank", "export", cls.bank, "-o", "plate.glb", cwd=cls.folder)
         cls.glb = Glb((cls.folder / "plate.glb").read_bytes())
         (cls.model,) = cls.glb.json["extensions"]["KHR_audio_rigid_bodies"]["modalModels"]
@@ -45,9 +44,6 @@ class MultipolesTest(unittest.TestCase):
         validator.validate(example["extensions"]["CARILLON_multipoles"])
         self.assertFalse(validator.is_valid({**self.own, "orders": [121]}))
         self.assertEqual(self.glb.json["extensionsUsed"], ["KHR_audio_rigid_bodies", "CARILLON_multipoles"])
-
-    def test_the_validator_has_no_complaint(self):
-        check_by_validator(self, self.folder / "plate.glb")
 
     def test_the_numbers_are_those_of_the_bank(self):
         modes = self.model["extras"]["carillon"]["modes"]

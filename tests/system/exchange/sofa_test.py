@@ -14,7 +14,7 @@ import netCDF4
 import numpy
 import scipy.special
 
-from banks import BIN, calc_db, fixtures, hear_modes, make_bank, run
+from banks import BIN, calc_db, fixtures, hear_modes, make_radiating_plate, run
 
 STRIKE_M = (0.13, 0.08, 0.01)
 # FreeFieldDirectivityTF 1.1 of AES69-2022: mandatory attributes with their prescribed text; variables with dimensions and attributes.
@@ -72,8 +72,7 @@ class SofaTest(unittest.TestCase):
     def setUpClass(cls):
         cls.place = tempfile.TemporaryDirectory()
         cls.folder = pathlib.Path(cls.place.name)
-        plate = {"shape": "plate", "length_m": 0.3, "width_m": 0.2, "thickness_m": 0.01, "nodes": 1000}
-        cls.bank = make_bank(cls.folder, "plate", plate, material="aluminium", band_hz=[100, 4000], radiation="bem")
+        cls.bank = make_radiating_plate(cls.folder)
 
     @classmethod
     def tearDownClass(cls):

@@ -17,6 +17,9 @@ import tempfile
 import numpy as np
 
 from browser import Browser, serve
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+import npm  # noqa: E402
 from web_test import BIN, EFFECTS, LATENCY, WEB, calc_db, read_wav, run
 
 STRIKE = {"time_s": 0.1, "body": "a", "triangle": 7, "impulse_n_s": [0.01, -0.02, 0.03], "duration_s": 0.0003}
@@ -64,12 +67,7 @@ def test_files():
 def test_vite():
     with tempfile.TemporaryDirectory(prefix="carillon-vite-") as scratch:
         folder = pathlib.Path(scratch)
-        (folder / "package.json").write_text('{"private": true, "type": "module", "devDependencies": {"vite": "^8.0.0"}}')
-        install = ["npm", "install", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error", "--fetch-retries=1"]
-        done = subprocess.run([*install, "--fetch-retry-mintimeout=1000"], cwd=folder, capture_output=True, text=True)
-        if done.returncode != 0:
-            first = (done.stderr.strip() or "no message").splitlines()[0]
-            print(f"not tested: npm could not fetch Vite ({first})")
+        if not npm.install(folder, vite="^8.0.0"):
             return
         shutil.copytree(WEB, folder / "engine")
         (folder / "public").mkdir()
