@@ -4,8 +4,8 @@ import subprocess
 
 
 def install(folder, **packages):
-    """Installs packages (name=version, _ for -) into node_modules of a folder. False, with a line that says why, where the registry cannot be
-    reached."""
+    """Installs packages (name=version, _ for -) into node_modules of a folder.
+    False, with a line that says why, where the registry cannot be reached."""
     dependencies = {name.replace("_", "-"): version for name, version in packages.items()}
     (folder / "package.json").write_text(json.dumps({"private": True, "type": "module", "dependencies": dependencies}))
     words = ["npm", "install", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error", "--fetch-retries=1"]
