@@ -1,8 +1,10 @@
 #!/usr/bin/python3
-"""Parts of carillon-tune on made sounds, frequencies and decays: peaks and what spoils them, assignment, choice of the damping law."""
+"""Parts of carillon-tune on made sounds, frequencies, decays and cuts: peaks and what spoils them, assignment, damping law, drawing."""
 import math
 import pathlib
+import re
 import sys
+import tempfile
 import unittest
 
 import numpy
@@ -10,6 +12,7 @@ import numpy
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "jobs/tune"), str(ROOT / "jobs/study")]
 import constants
+import drawing
 import losses
 import sound
 
@@ -141,6 +144,56 @@ class Laws(unittest.TestCase):
 
     def test_no_decays_no_law(self):
         self.assertEqual(losses.fit_laws([sound.Peak(440.0, 0.1)]), [])
+
+
+def make_box(size_m, cells):
+    """Surface of a box with vertices shared at its edges: positions (N, 3) from 0 to the sizes, triangles that face outwards."""
+    numbers, triangles = {}, []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for end in (0, cells[axis]):
+            for i in range(cells[u]):
+                for j in range(cells[v]):
+                    corners = []
+                    for du, dv in ((0, 0), (1, 0), (1, 1), (0, 1)):
+                        place = [0, 0, 0]
+                        place[axis], place[u], place[v] = end, i + du, j + dv
+                        corners.append(numbers.setdefault(tuple(place), len(numbers)))
+                    if end == 0:
+                        corners.reverse()
+                    triangles += [corners[:3], [corners[0], corners[2], corners[3]]]
+    return numpy.array(list(numbers)) * numpy.array(size_m) / cells, numpy.array(triangles)
+
+
+class Drawing(unittest.TestCase):
+    def draw(self, move):
+        """Captions of the views of a box of 300 x 50 x 20 mm whose vertices (N, 3) move by move(points)."""
+        points, triangles = make_box((0.3, 0.05, 0.02), (60, 10, 4))
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "drawing.svg"
+            drawing.draw(path, (points, triangles), (points + move(points), triangles), "bar", ["table"])
+            return re.findall("seen from ([^<]*)<", path.read_text())
+
+    def test_each_cut_side_has_a_view(self):
+        def cut(p):
+            move = numpy.zeros_like(p)
+            move[:, 2] = -0.004 * (p[:, 2] > 0.019) * numpy.exp(-(((p[:, 0] - 0.15) / 0.04) ** 2))
+            move[:, 2] += 0.002 * (p[:, 2] < 0.001) * numpy.exp(-(((p[:, 0] - 0.10) / 0.02) ** 2))
+            return move
+
+        top, bottom = self.draw(cut)
+        self.assertTrue(top.startswith("+z: 300.0 x 50.0 mm") and top.endswith("deepest 4.000 mm"), top)
+        self.assertTrue(bottom.startswith("-z: 300.0 x 50.0 mm") and bottom.endswith("deepest 2.000 mm"), bottom)
+
+    def test_end_that_is_cut(self):
+        def cut(p):
+            return numpy.outer(-0.001 * (p[:, 0] > 0.299), (1, 0, 0))
+
+        self.assertEqual(len(views := self.draw(cut)), 1)
+        self.assertTrue(views[0].startswith("+x: 50.0 x 20.0 mm"), views)
+
+    def test_nothing_is_cut(self):
+        self.assertEqual(self.draw(numpy.zeros_like), ["+z: 300.0 x 50.0 mm"])
 
 
 if __name__ == "__main__":
