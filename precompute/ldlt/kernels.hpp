@@ -85,6 +85,9 @@ struct SolveKernels {
   void (*multiply_by_d_inverse)(const double* diagonal, const double* off, int n, int vectors, const double* in, double* out);
   /// to (m rows of n numbers, to_stride apart) = transpose of from (n rows of m numbers, from_stride apart). They must not overlap.
   void (*transpose)(const double* from, long from_stride, int n, int m, double* to, long to_stride);
+  /// to = from and to += from, `count` numbers, a multiple of 8.
+  void (*copy)(const double* from, long count, double* to);
+  void (*add)(const double* from, long count, double* to);
 };
 const SolveKernels& find_solve_kernels();
 

@@ -2,11 +2,13 @@
 // are applied as products (L11^-1 is stored, so there is no triangular solve) and read once in each direction for up to 32 columns. For a
 // shared front each rank multiplies its tiles; the owner of a diagonal tile sums the partial results along its row and sends its part of
 // the solution down its column; backward, along its row. The row of the next panel is multiplied first, so that the next owner can start;
-// rows behind the pivots, on which no panel of the front waits, after all panels, backward before all.
+// rows behind the pivots, on which no panel of the front waits, while the rank waits for messages.
 // Source: Liu 1992, section 6; Ashcraft, Eisenstat, Liu 1990, A fan-in algorithm for distributed sparse numerical factorization (sums
 // travel to the owner once).
 #include <algorithm>
 #include <cstring>
+#include <deque>
+#include <functional>
 #include <list>
 #include <map>
 #include <numeric>
@@ -230,11 +232,6 @@ class Solver {
   static constexpr int kFirstTag = 128;
   static int find_tag(std::int32_t front, Tag tag) { return kFirstTag + kTags * front + tag; }
 
-  static Ints list_slots(const SharedFront& front, int i) {
-    Ints slots(front.map.nodes(i));
-    std::iota(slots.begin(), slots.end(), front.first_slot + front.row_begin[i]);
-    return slots;
-  }
   static Ints list_given(const GivenRows& given) {
     Ints slots(given.count);
     std::iota(slots.begin(), slots.end(), given.first_slot);
@@ -254,8 +251,15 @@ class Solver {
                                 nodes_.data() + begin, blocks_[b].rows);
   }
 
-  /// Room for a panel's part of each block, and its blocks.
-  std::vector<double*> list_panel(int k) {
+  /// First row of tile row i in each block.
+  std::vector<double*> list_rows(const SharedFront& front, int i) const {
+    std::vector<double*> rows;
+    for (const Block& block : blocks_) rows.push_back(find_row(block, front.first_slot + front.row_begin[i]));
+    return rows;
+  }
+
+  /// Room for a panel's part of each block.
+  std::vector<double*> list_panel(int k) const {
     std::vector<double*> rows;
     for (std::size_t b = 0; b < blocks_.size(); ++b) rows.push_back(columns_ + (k * blocks_.size() + b) * kMaxBlock * kWidth);
     return rows;
@@ -276,33 +280,36 @@ class Solver {
       const std::vector<int>& column = front.column_places[k];
       std::vector<double*>& in = solutions[k];
       if (home == front.place) {
-        const Ints slots = list_slots(front, k);
+        in = list_rows(front, k);
         const std::vector<int>& row = front.row_places[k];
         for (auto place = row.rbegin(); place != row.rend(); ++place)  // the nearest comes last
-          receive(front.map.rank(*place), find_tag(front.id, kAlongRow), slots, Arrival::kIsAdded);
-        for (const Block& block : blocks_) {
-          double* own = find_row(block, slots.front());
+          receive_rows(front.map.rank(*place), find_tag(front.id, kAlongRow), n, in, Arrival::kIsAdded);
+        for (std::size_t b = 0; b < blocks_.size(); ++b) {
+          const int width = blocks_[b].width;
           const std::uint8_t* order = numbers_.order.data() + panel.pivots;
-          for (int c = 0; c < n; ++c) copy_row(own + order[c] * block.width, block.width, pivots + c * block.width);
-          kernels_.trmm(numbers_.panels.data() + panel.triangle, n, block.width / 8, pivots, own);
-          in.push_back(own);
+          for (int c = 0; c < n; ++c) copy_row(in[b] + order[c] * width, width, pivots + c * width);
+          kernels_.trmm(numbers_.panels.data() + panel.triangle, n, width / 8, pivots, in[b]);
         }
-        for (const int place : column) send(front.map.rank(place), find_tag(front.id, kAlongColumn), slots);
+        for (const int place : column) send_rows(front.map.rank(place), find_tag(front.id, kAlongColumn), n, in);
       } else if (contains(column, front.place)) {
         in = list_panel(k);
-        receive_block(front.map.rank(home), find_tag(front.id, kAlongColumn), n, in);
+        receive_rows(front.map.rank(home), find_tag(front.id, kAlongColumn), n, in, Arrival::kIsSet);
       }
       const std::int32_t begin = front.row_begin[k + 1];
       const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[k + 2] : begin;
       const double* tiles = numbers_.find_tiles(panel);
       if (!in.empty()) subtract_column(front, tiles, k, begin, next, in);
       if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[k + 1], front.place))
-        send(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1));
-      if (!in.empty()) subtract_column(front, tiles, k, next, behind, in);
+        send_rows(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), 3 * front.map.nodes(k + 1),
+                  list_rows(front, k + 1));
+      if (in.empty()) continue;
+      subtract_column(front, tiles, k, next, behind, in);
+      for (std::int32_t row = behind; row < front.own_nodes(); row += kPanelNodes)
+        later_.push_back({k, [this, &front, &in, tiles, k, row] {
+                            subtract_column(front, tiles, k, row, std::min(row + kPanelNodes, front.own_nodes()), in);
+                          }});
     }
-    for (int k = 0; k < front.map.pivot_tiles(); ++k)
-      if (!solutions[k].empty())
-        subtract_column(front, numbers_.find_tiles(numbers_.shared[f][k]), k, behind, front.own_nodes(), solutions[k]);
+    do_later(0);
     for (const SumMessage& sums : front.to_parent) send_sums(sums, kSums);
   }
 
@@ -321,11 +328,16 @@ class Solver {
       const std::vector<double*>& sums = sums_of_panel[k] = list_panel(k);
       for (std::size_t b = 0; b < blocks_.size(); ++b)
         std::memset(sums[b], 0, sizeof(double) * static_cast<std::size_t>(n * blocks_[b].width));
-      if (is_home)
+      if (is_home) {
+        const std::vector<double*> own = list_rows(front, k);
         for (std::size_t b = 0; b < blocks_.size(); ++b)
           kernels_.multiply_by_d_inverse(numbers_.d_diagonal.data() + panel.pivots, numbers_.d_off.data() + panel.pivots, n,
-                                         blocks_[b].width / 8, find_row(blocks_[b], list_slots(front, k).front()), sums[b]);
-      subtract_rows(front, numbers_.find_tiles(panel), k, behind, front.own_nodes(), sums);
+                                         blocks_[b].width / 8, own[b], sums[b]);
+      }
+      for (std::int32_t row = behind; row < front.own_nodes(); row += kPanelNodes)
+        later_.push_back({k, [this, &front, &sums, &panel, k, row] {
+                            subtract_rows(front, numbers_.find_tiles(panel), k, row, std::min(row + kPanelNodes, front.own_nodes()), sums);
+                          }});
     }
     for (int k = front.map.pivot_tiles(); k-- > 0;) {
       const SharedPanel& panel = numbers_.shared[f][k];
@@ -335,28 +347,30 @@ class Solver {
       const std::int32_t begin = front.row_begin[k + 1];
       const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[k + 2] : begin;
       const double* tiles = numbers_.find_tiles(panel);
+      do_later(k);
       if (!sums.empty()) subtract_rows(front, tiles, k, next, behind, sums);
       if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[k + 1], front.place))
-        receive(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1), Arrival::kIsSet);
+        receive_rows(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), 3 * front.map.nodes(k + 1),
+                     list_rows(front, k + 1), Arrival::kIsSet);
       if (!sums.empty()) subtract_rows(front, tiles, k, begin, next, sums);
       if (!is_home) {
-        if (!sums.empty()) send_block(front.map.rank(front.map.owner(k, k)), find_tag(front.id, kAlongColumn), n, sums);
+        // Copied, as their room serves the next front.
+        if (!sums.empty()) send_copy(front.map.rank(front.map.owner(k, k)), find_tag(front.id, kAlongColumn), n, sums);
         continue;
       }
       const std::vector<int>& column = front.column_places[k];
       for (auto place = column.rbegin(); place != column.rend(); ++place)
-        add_block(front.map.rank(*place), find_tag(front.id, kAlongColumn), n, sums);
+        receive_rows(front.map.rank(*place), find_tag(front.id, kAlongColumn), n, sums, Arrival::kIsAdded);
       alignas(64) double solution[kMaxBlock * 16];
-      const Ints slots = list_slots(front, k);
+      const std::vector<double*> own = list_rows(front, k);
       const double* triangle = numbers_.panels.data() + panel.triangle;
       for (std::size_t b = 0; b < blocks_.size(); ++b) {
         const int width = blocks_[b].width;
         std::memset(solution, 0, sizeof(double) * static_cast<std::size_t>(n * width));
         kernels_.add_trmm_transposed(triangle, n, width / 8, sums[b], solution, triangle);
-        double* own = find_row(blocks_[b], slots.front());
-        for (int c = 0; c < n; ++c) copy_row(solution + c * width, width, own + numbers_.order[panel.pivots + c] * width);
+        for (int c = 0; c < n; ++c) copy_row(solution + c * width, width, own[b] + numbers_.order[panel.pivots + c] * width);
       }
-      for (const int place : front.row_places[k]) send(front.map.rank(place), find_tag(front.id, kAlongRow), slots);
+      for (const int place : front.row_places[k]) send_rows(front.map.rank(place), find_tag(front.id, kAlongRow), n, own);
     }
     for (const SumMessage& sums : front.from_children) send_sums(sums, kSolutions);
   }
@@ -372,6 +386,11 @@ class Solver {
   }
 
   // ---- messages ----
+
+  /// Does the deferred products of panels >= k.
+  void do_later(int k) {
+    for (; !later_.empty() && later_.front().panel >= k; later_.pop_front()) later_.front().work();
+  }
 
   /// Sums to or from this rank itself are kept by child, without a message.
   void send_sums(const SumMessage& sums, Tag tag) {
@@ -391,17 +410,22 @@ class Solver {
       receive(sums.rank, find_tag(sums.child, tag), sums.slots, arrival);
   }
 
+  /// Rows of nodes that lie apart, of all blocks in one message.
   void pack(const Ints& slots, std::vector<double>& message) const {
-    message.reserve(3 * slots.size() * static_cast<std::size_t>(row_width_));
+    message.resize(3 * slots.size() * static_cast<std::size_t>(row_width_));
+    double* to = message.data();
     for (const Block& block : blocks_)
-      for (const std::int32_t slot : slots) message.insert(message.end(), find_row(block, slot), find_row(block, slot) + 3 * block.width);
+      for (const std::int32_t slot : slots) {
+        kernels_.copy(find_row(block, slot), 3 * block.width, to);
+        to += 3 * block.width;
+      }
   }
 
   void unpack(const double* from, const Ints& slots, Arrival arrival) const {
+    const auto move = arrival == Arrival::kIsAdded ? kernels_.add : kernels_.copy;
     for (const Block& block : blocks_)
       for (const std::int32_t slot : slots) {
-        double* row = find_row(block, slot);
-        for (int i = 0; i < 3 * block.width; ++i) row[i] = arrival == Arrival::kIsAdded ? row[i] + from[i] : from[i];
+        move(from, 3 * block.width, find_row(block, slot));
         from += 3 * block.width;
       }
   }
@@ -409,40 +433,56 @@ class Solver {
   void send(int rank, int tag, const Ints& slots) {
     std::vector<double>& message = messages_.emplace_back();
     pack(slots, message);
-    MPI_Isend(message.data(), static_cast<int>(message.size()), MPI_DOUBLE, rank, tag, plan_.comm, &requests_.emplace_back());
+    send_numbers(rank, tag, message.data(), message.size());
   }
 
   void receive(int rank, int tag, const Ints& slots, Arrival arrival) {
-    receive_numbers(rank, tag, 3 * slots.size() * static_cast<std::size_t>(row_width_));
+    received_.resize(3 * slots.size() * static_cast<std::size_t>(row_width_));
+    receive_numbers(rank, tag, received_.data(), received_.size());
     unpack(received_.data(), slots, arrival);
   }
 
-  void receive_numbers(int rank, int tag, std::size_t count) {
-    received_.resize(count);
-    MPI_Recv(received_.data(), static_cast<int>(count), MPI_DOUBLE, rank, tag, plan_.comm, MPI_STATUS_IGNORE);
+  /// n rows of each block, a message a block, from where they are: they must stay until finish_sends().
+  void send_rows(int rank, int tag, int n, const std::vector<double*>& rows) {
+    for (std::size_t b = 0; b < blocks_.size(); ++b) send_numbers(rank, tag, rows[b], static_cast<std::size_t>(n * blocks_[b].width));
   }
 
-  /// n rows of each block.
-  void receive_block(int rank, int tag, int n, const std::vector<double*>& rows) {
-    receive_numbers(rank, tag, static_cast<std::size_t>(n) * static_cast<std::size_t>(row_width_));
-    const double* from = received_.data();
+  void send_copy(int rank, int tag, int n, const std::vector<double*>& rows) {
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      std::copy_n(from, n * blocks_[b].width, rows[b]);
-      from += n * blocks_[b].width;
+      std::vector<double>& message = messages_.emplace_back(n * blocks_[b].width);
+      kernels_.copy(rows[b], n * blocks_[b].width, message.data());
+      send_numbers(rank, tag, message.data(), message.size());
     }
   }
 
-  void send_block(int rank, int tag, int n, const std::vector<double*>& sums) {
-    std::vector<double>& message = messages_.emplace_back();
-    for (std::size_t b = 0; b < blocks_.size(); ++b) message.insert(message.end(), sums[b], sums[b] + n * blocks_[b].width);
-    MPI_Isend(message.data(), static_cast<int>(message.size()), MPI_DOUBLE, rank, tag, plan_.comm, &requests_.emplace_back());
+  void receive_rows(int rank, int tag, int n, const std::vector<double*>& rows, Arrival arrival) {
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const int count = n * blocks_[b].width;
+      if (arrival == Arrival::kIsSet) {
+        receive_numbers(rank, tag, rows[b], static_cast<std::size_t>(count));
+        continue;
+      }
+      received_.resize(static_cast<std::size_t>(count));
+      receive_numbers(rank, tag, received_.data(), received_.size());
+      kernels_.add(received_.data(), count, rows[b]);
+    }
   }
 
-  void add_block(int rank, int tag, int n, const std::vector<double*>& sums) {
-    receive_numbers(rank, tag, static_cast<std::size_t>(n) * static_cast<std::size_t>(row_width_));
-    const double* from = received_.data();
-    for (std::size_t b = 0; b < blocks_.size(); ++b)
-      for (int i = 0; i < n * blocks_[b].width; ++i) sums[b][i] += *from++;
+  void send_numbers(int rank, int tag, const double* from, std::size_t count) {
+    MPI_Isend(from, static_cast<int>(count), MPI_DOUBLE, rank, tag, plan_.comm, &requests_.emplace_back());
+  }
+
+  /// Does deferred products until the message arrives.
+  void receive_numbers(int rank, int tag, double* to, std::size_t count) {
+    MPI_Request request = MPI_REQUEST_NULL;
+    MPI_Irecv(to, static_cast<int>(count), MPI_DOUBLE, rank, tag, plan_.comm, &request);
+    for (; !later_.empty(); later_.pop_front()) {
+      int has_come = 0;
+      MPI_Test(&request, &has_come, MPI_STATUS_IGNORE);
+      if (has_come != 0) return;
+      later_.front().work();
+    }
+    MPI_Wait(&request, MPI_STATUS_IGNORE);
   }
 
   void finish_sends() {
@@ -459,6 +499,12 @@ class Solver {
   int row_width_ = 0;
   double* columns_ = nullptr;                         // Workspace::columns
   std::map<std::int32_t, std::vector<double>> kept_;  // by child
+  /// Products of a panel of the current front that no panel waits for yet: tiles in rows behind the pivots.
+  struct Later {
+    int panel;
+    std::function<void()> work;
+  };
+  std::deque<Later> later_;
   std::list<std::vector<double>> messages_;
   std::vector<double> received_;
   std::vector<MPI_Request> requests_;

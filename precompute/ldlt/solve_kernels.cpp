@@ -1,6 +1,8 @@
 // Method:     Products of tiles with up to 16 right-hand sides keep a tile's sums in registers; every number of L is read once, in order,
 //             and multiplied into whole vectors.
 // Source:     Goto and van de Geijn 2008, Anatomy of high-performance matrix multiplication.
+#include <cstring>
+
 #include "precompute/ldlt/kernels.hpp"
 #include "runtime/base/simd.hpp"
 
@@ -247,7 +249,13 @@ void transpose(const double* from, long from_stride, int n, int m, double* to, l
     for (int i = j < whole_m ? whole_n : 0; i < n; ++i) to[j * to_stride + i] = from[i * from_stride + j];
 }
 
-const SolveKernels kTable{subtract_product, subtract_transposed, trmm, add_trmm_transposed, multiply_by_d_inverse, transpose};
+void copy(const double* from, long count, double* to) { std::memcpy(to, from, static_cast<std::size_t>(count) * sizeof(double)); }
+
+void add(const double* from, long count, double* to) {
+  for (long i = 0; i < count; i += 4) store(to + i, load(to + i) + load(from + i));
+}
+
+const SolveKernels kTable{subtract_product, subtract_transposed, trmm, add_trmm_transposed, multiply_by_d_inverse, transpose, copy, add};
 
 const SolveKernels& get_kernels() { return kTable; }
 
