@@ -28,6 +28,8 @@
 #include "runtime/base/signal_pause.hpp"
 #include "runtime/base/temporary.hpp"
 
+extern "C" char** environ;
+
 namespace carillon::base {
 namespace {
 
@@ -89,12 +91,41 @@ struct Plan {
   Command::Group group{};
   int signal_at_end = 0;
   bool yields_memory = false, default_signals = false;
+  const std::function<int()>* function = nullptr;  // instead of `program`
   sigset_t mask{};
   pid_t parent = 0;
   int error = 0;
 };
 
-/// Runs in the child, which shares the parent's memory.
+bool is_fault(int signal) { return signal == SIGSEGV || signal == SIGBUS || signal == SIGFPE || signal == SIGABRT || signal == SIGILL; }
+
+/// As exec does.
+void close_marked_descriptors() {
+  std::error_code error;
+  std::vector<int> marked;
+  for (fs::directory_iterator it("/proc/self/fd", error), end; !error && it != end; it.increment(error)) {
+    const int descriptor = std::atoi(it->path().filename().c_str());
+    const int flags = ::fcntl(descriptor, F_GETFD);
+    if (descriptor > STDERR_FILENO && flags >= 0 && (flags & FD_CLOEXEC) != 0) marked.push_back(descriptor);
+  }
+  for (const int descriptor : marked) ::close(descriptor);
+}
+
+/// In a fork, in place of exec.
+[[noreturn]] void call(const Plan& plan) {
+  close_marked_descriptors();
+  environ = const_cast<char**>(plan.environment);
+  int code = kExitSystem;
+  try {
+    code = (*plan.function)();
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+  }
+  std::fflush(nullptr);
+  ::_exit(code);
+}
+
+/// Runs in the child, which shares the parent's memory unless it is a fork.
 [[noreturn]] void execute(Plan& plan) {
   if (plan.group == Command::Group::own) ::setpgid(0, 0);
   if (plan.group == Command::Group::session) ::setsid();
@@ -105,6 +136,7 @@ struct Plan {
   for (int signal = 1; signal < NSIG; ++signal) {
     struct sigaction before {};
     const bool is_ignored = ::sigaction(signal, nullptr, &before) == 0 && before.sa_handler == SIG_IGN;
+    if (plan.function != nullptr && is_fault(signal)) continue;
     if (!is_ignored || plan.default_signals || signal == SIGPIPE) ::sigaction(signal, &action, nullptr);
   }
   if (plan.yields_memory) {
@@ -115,6 +147,7 @@ struct Plan {
   for (int k = 0; k < 3; ++k) ready = ready && ::dup2(plan.streams[k], k) == k;
   ready = ready && (plan.folder == nullptr || ::chdir(plan.folder) == 0);
   ::sigprocmask(SIG_SETMASK, &plan.mask, nullptr);
+  if (ready && plan.function != nullptr) call(plan);
   if (ready) ::execve(plan.program, plan.words, plan.environment);
   plan.error = errno;
   ::_exit(127);
@@ -122,8 +155,24 @@ struct Plan {
 
 /// A stack frame of its own protects the caller's registers from the child.
 [[gnu::noinline]] pid_t fork_and_execute(Plan& plan) {
-  const pid_t child = ::vfork();
+  const pid_t child = plan.function != nullptr ? ::fork() : ::vfork();
   if (child == 0) execute(plan);
+  return child;
+}
+
+/// By a process that ends at once; it shares the memory, and only the fork is a copy of it.
+[[gnu::noinline]] pid_t fork_and_give_away(Plan& plan) {
+  volatile pid_t child = -1;
+  const pid_t between = ::vfork();
+  if (between == 0) {
+    plan.parent = ::getpid();
+    child = fork_and_execute(plan);
+    if (child < 0) plan.error = errno;
+    ::_exit(0);
+  }
+  while (between > 0 && ::waitpid(between, nullptr, 0) < 0 && errno == EINTR) {
+  }
+  if (child < 0 && plan.error != 0) errno = plan.error;
   return child;
 }
 
@@ -301,7 +350,7 @@ pid_t start(const Command& command) {
     throw StartError(fmt::format("{}: cannot be started: {}", command.words.at(0), std::strerror(error)), error);
   };
   // Resolve PATH here: execvp() in the child would pass non-executables to a shell.
-  const std::string program = find_path(command.words.at(0));
+  const std::string program = command.function ? command.words.at(0) : find_path(command.words.at(0));
   if (program.empty()) refuse(ENOENT);
   const std::vector<char*> words = to_pointers(command.words);
   const std::vector<std::string> entries = command.environment ? *command.environment : make_environment();
@@ -315,6 +364,7 @@ pid_t start(const Command& command) {
   plan.signal_at_end = command.signal_at_end;
   plan.yields_memory = command.yields_memory;
   plan.default_signals = command.default_signals;
+  plan.function = command.function ? &command.function : nullptr;
   plan.parent = ::getpid();
   ::sigemptyset(&plan.mask);
   for (const int signal : command.blocked) ::sigaddset(&plan.mask, signal);
@@ -331,7 +381,7 @@ pid_t start(const Command& command) {
     plan.streams[k] = streams[k].get();
   }
   std::optional<SignalPause> pause(std::in_place);
-  const pid_t child = fork_and_execute(plan);
+  const pid_t child = command.is_given_away ? fork_and_give_away(plan) : fork_and_execute(plan);
   const int error = child < 0 ? errno : plan.error;
   pause.reset();
   if (error == 0) return child;

@@ -42,10 +42,12 @@ struct Command {
   std::filesystem::path folder = {};                                   // working directory; empty: inherited
   int input = kNull, output = kNull, errors = kNull;                   // kNull, kInherit, kCapture or a descriptor
   enum class Group { same, own, session } group = Group::same;         // process group or session
-  int signal_at_end = 0;          // sent when the starting thread ends; 0: none by start(), SIGKILL by run()
-  std::vector<int> blocked = {};  // signals blocked at start
-  bool yields_memory = false;     // preferred victim of the kernel's OOM killer
-  bool default_signals = false;   // resets ignored signals to their default actions; otherwise only SIGPIPE is reset
+  int signal_at_end = 0;               // sent when the starting thread ends; 0: none by start(), SIGKILL by run()
+  std::vector<int> blocked = {};       // signals blocked at start
+  bool yields_memory = false;          // preferred victim of the kernel's OOM killer
+  bool default_signals = false;        // resets ignored signals to their default actions; otherwise only SIGPIPE is reset
+  std::function<int()> function = {};  // run in a fork of this process instead of a program; returns the exit code
+  bool is_given_away = false;          // with `function`: a child of the nearest ancestor that is a subreaper instead of this process
 };
 
 /// Process start failed.
@@ -60,7 +62,8 @@ class StartError : public SystemError {
 };
 
 /// Starts a process. Throws StartError "WORD: cannot be started: REASON". Uses vfork: no pthread_atfork() handlers (MPI registers some), no
-/// copied page tables. kCapture acts as /dev/null.
+/// copied page tables. kCapture acts as /dev/null. With `function` the process is a fork without the descriptors that exec would close; it
+/// keeps handlers of faults (SIGSEGV ...), and ends without destructors and atexit() handlers, which belong to this process.
 pid_t start(const Command& command);
 
 /// Replaces this process by words[0] (a path); environment: own if none given. Throws StartError.

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -11,7 +12,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
 
+#include "runtime/base/descriptor.hpp"
 #include "runtime/base/environment.hpp"
 #include "tests/support/catch_message.hpp"
 
@@ -205,6 +211,45 @@ TEST(Command, a_program_ends_with_its_parent) {
   EXPECT_TRUE(is_gone);
   ::close(ends[0]);
   ::close(ends[1]);
+}
+
+/// Exit code of a child; -1: it is none of this process.
+int await_child(pid_t child) {
+  int status = 0;
+  if (::waitpid(child, &status, 0) != child) return -1;
+  return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+}
+
+TEST(Command, a_function_runs_in_a_fork_like_a_program) {
+  const Descriptor marked(::open("/dev/null", O_RDONLY | O_CLOEXEC)), kept(::open("/dev/null", O_RDONLY));
+  int count = 0;
+  const auto function = [&] {
+    ++count;
+    const bool is_right = ::fcntl(marked.get(), F_GETFD) < 0 && ::fcntl(kept.get(), F_GETFD) == 0 && ::getsid(0) == ::getpid() &&
+                          fs::current_path() == "/usr" && std::string_view(std::getenv("NAME")) == "value" && ::getenv("PATH") == nullptr;
+    return is_right ? 7 : 1;
+  };
+  const std::vector<std::string> environment{"NAME=value"};
+  const auto begin = [&](const std::function<int()>& work) {
+    return start({.words = {"work"}, .environment = environment, .folder = "/usr", .group = Command::Group::session, .function = work});
+  };
+  EXPECT_EQ(await_child(begin(function)), 7);
+  EXPECT_EQ(count, 0);
+  EXPECT_EQ(await_child(begin([]() -> int { throw SystemError("refused"); })), kExitSystem);
+  EXPECT_EQ(await_child(begin([] { return ::raise(SIGKILL); })), 128 + SIGKILL);
+}
+
+TEST(Command, a_function_that_is_given_away_is_a_child_of_the_subreaper) {
+  const auto begin = [] { return start({.words = {"work"}, .function = [] { return 7; }, .is_given_away = true}); };
+  ASSERT_EQ(::prctl(PR_SET_CHILD_SUBREAPER, 1), 0);
+  EXPECT_EQ(await_child(begin()), 7);
+  // Of its own starter, where that is none.
+  const pid_t between = start({.words = {"between"}, .function = [&] { return await_child(begin()) == -1 ? 5 : 1; }});
+  EXPECT_EQ(await_child(between), 5);
+  int status = 0;
+  EXPECT_GT(::waitpid(-1, &status, 0), 0);
+  EXPECT_EQ(WEXITSTATUS(status), 7);
+  ::prctl(PR_SET_CHILD_SUBREAPER, 0);
 }
 
 TEST(Command, closed_standard_streams_are_permitted) {
