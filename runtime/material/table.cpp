@@ -68,11 +68,15 @@ MaterialTable MaterialTable::read(const base::Document& document, const Material
   return table;
 }
 
+const MaterialTable& MaterialTable::get_built_in() {
+  static const MaterialTable table = read(base::parse_document(kTableText, "runtime/material/materials.json"));
+  return table;
+}
+
 const MaterialTable& MaterialTable::get() {
   static const MaterialTable table = [] {
-    MaterialTable built_in = read(base::parse_document(kTableText, "runtime/material/materials.json"));
     const std::filesystem::path own = find_user_file();
-    return own.empty() ? built_in : read(base::read_document(own), &built_in);
+    return own.empty() ? get_built_in() : read(base::read_document(own), &get_built_in());
   }();
   return table;
 }

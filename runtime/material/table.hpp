@@ -26,6 +26,8 @@ class MaterialTable {
   /// Built-in rows, preceded by the user's file: $CARILLON_MATERIALS, else carillon/materials.json in $XDG_CONFIG_HOME or ~/.config, if
   /// present. Read on the first call. Throws InputError for an invalid file.
   static const MaterialTable& get();
+  /// Built-in rows, read on the first call.
+  static const MaterialTable& get_built_in();
   /// Rows of a document {"materials": [...]}, followed by those of `base`, which they may refer to by "from". Throws InputError.
   static MaterialTable read(const base::Document& document, const MaterialTable* base = nullptr);
 
