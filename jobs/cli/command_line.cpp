@@ -33,7 +33,7 @@ constexpr const char* kFooter =
     "3 a job failed, 4 system error, 128 + n stopped by signal n. Store: --store, else \"store\" of the profile, else\n"
     "$XDG_DATA_HOME/carillon, else ~/.local/share/carillon. Profile: --profile, else ~/.config/carillon/profile.json,\n"
     "{\"store\": DIR, \"on\": \"local\" or \"slurm\"}.";
-constexpr int kMaxRanks = 1'000'000;
+constexpr int kMaxRanks = attempt::kMaxRanks;
 constexpr double kMaxGb = 1e9;
 
 /// Gigabytes, at least `min`. Rejects NaN, which CLI::Range accepts.
@@ -337,17 +337,9 @@ void add_attempt(CLI::App& app, Run& run) {
   attempt::Options& attempt = options->attempt;
   CLI::App* command =
       app.add_subcommand("attempt", "One attempt at the job of a folder of work, for carillon run and Slurm scripts")->group("");
-  command->add_option("WORK", attempt.work, "work/ab/ID of a store")->required();
-  command->add_option("--ranks", attempt.ranks)->check(base::whole_range(1, kMaxRanks), base::describe_whole_range(1, kMaxRanks));
-  command->add_option("--memory-gb", attempt.memory_gb);
-  command->add_option("--memory-limit-gb", attempt.memory_limit_gb);
-  command->add_option("--time-limit-s", attempt.time_limit_s);
-  command->add_option("--token", attempt.token);
-  command->add_option("--mpirun-option", attempt.mpirun_options, "Argument of mpirun; repeatable")->allow_extra_args(false);
+  attempt::add_options(*command, attempt);
   command->add_option("--engine", options->engine)->check(make_engine_check());
   command->add_option("--launcher", options->launcher)->check(CLI::IsMember({"alone", "mpirun", "srun"}));
-  command->add_flag("--predict", attempt.is_prediction);
-  command->add_flag("--pictures", attempt.has_pictures);
   command->add_option("--grace-s", attempt.grace_s);
   command->add_option("--hang-s", attempt.hang_s);
   command->callback([&run, options] { run = [options] { return run_attempt(*options); }; });

@@ -3,10 +3,15 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "jobs/store/records.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace carillon::attempt {
 
@@ -27,7 +32,11 @@ struct Options {
   double grace_s = 60.0;                    // from "save and stop" to SIGTERM
   double hang_s = 600.0;                    // without output while a rank uses no CPU time: hung
   double silence_s = 24 * 3600.0;           // without output at all: hung
+  // Runs carillon-precompute on one rank with these words, in a fork; none: the program is started.
+  std::function<int(const std::vector<std::string>& words)> solver = {};
 };
+
+inline constexpr int kMaxRanks = 1'000'000;
 
 /// Memory of carillon-draw and its X server [GB]; 0.54 measured, independent of the body. It runs after the solver, so a job needs the
 /// larger of the two.
@@ -41,6 +50,9 @@ inline constexpr int kExitBusy = 75;
 /// Takes over the signals of the process and makes it a subreaper. Returns the exit code: 0, 2, 3, 4 (permanent failure), kExitCheckpointed
 /// or kExitBusy. InputError: `work` is not a folder of work. SystemError: the folder cannot be written.
 int run_attempt(const Options& options);
+
+/// Adds the options that make_arguments() writes to a command line.
+void add_options(CLI::App& app, Options& options);
 
 /// The command line for run_attempt(): {program, "attempt", ...}; `program`: carillon.
 std::vector<std::string> make_arguments(const std::filesystem::path& program, const Options& options);

@@ -137,7 +137,14 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   return launch;
 }
 
-pid_t start(const Launch& launch, const fs::path& folder, const fs::path& log, const fs::path& output) {
+Launch make_worker_launch(std::size_t title_bytes) {
+  constexpr std::size_t kTokenDigits = 32;
+  return {{base::require_program("carillon-precompute"), "--worker", std::string(title_bytes, ' ')},
+          make_environment(std::string(kTokenDigits, '0'), nullptr, true)};
+}
+
+pid_t start(const Launch& launch, const fs::path& folder, const fs::path& log, const fs::path& output,
+            const std::function<int(const std::vector<std::string>&)>& solver) {
   const base::Descriptor errors = open_output(log, O_APPEND);
   const base::Descriptor own = output.empty() ? base::Descriptor() : open_output(output, O_TRUNC);
   return base::start({.words = launch.arguments,
@@ -148,7 +155,8 @@ pid_t start(const Launch& launch, const fs::path& folder, const fs::path& log, c
                       .group = base::Command::Group::own,
                       .signal_at_end = SIGTERM,
                       .yields_memory = true,  // the kernel kills the solver first
-                      .default_signals = true});
+                      .default_signals = true,
+                      .function = solver ? std::function<int()>([&] { return solver(launch.arguments); }) : nullptr});
 }
 
 }  // namespace carillon::attempt

@@ -3,7 +3,9 @@
 
 #include <sys/types.h>
 
+#include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -39,9 +41,14 @@ bool is_under_slurm();
 /// Command and environment. `scratch`: null under Slurm. SystemError if a program is not installed.
 Launch make_launch(const Options& options, const std::string& token, const Scratch* scratch);
 
+/// The worker (jobs/queue/worker): its last word is `title_bytes` of room for the command lines of its forks, and CARILLON_ATTEMPT in its
+/// environment that for their tokens. SystemError if carillon-precompute is not installed.
+Launch make_worker_launch(std::size_t title_bytes);
+
 /// Starts the command in `folder`, in its own process group, without input; standard output goes to `output` (empty: appended to `log`),
-/// errors to `log`. It gets SIGTERM when this process dies. SystemError if it cannot be started.
+/// errors to `log`. It gets SIGTERM when this process dies. `solver`: Options::solver, called in a fork instead. SystemError if it cannot
+/// be started.
 pid_t start(const Launch& launch, const std::filesystem::path& folder, const std::filesystem::path& log,
-            const std::filesystem::path& output = {});
+            const std::filesystem::path& output = {}, const std::function<int(const std::vector<std::string>&)>& solver = {});
 
 }  // namespace carillon::attempt

@@ -68,6 +68,17 @@ sigset_t make_signals() {
   return set;
 }
 
+/// Ends what the solver has left. This process is a subreaper: all its descendants are below its children.
+void end_descendants(const std::string& entry) {
+  while (::waitpid(-1, nullptr, WNOHANG) > 0) {
+  }
+  siginfo_t info{};
+  if (::waitid(P_ALL, 0, &info, WEXITED | WNOHANG | WNOWAIT) != 0 && errno == ECHILD) return;
+  process::end_with_environment(entry);
+  while (::waitpid(-1, nullptr, WNOHANG) > 0) {
+  }
+}
+
 class Watcher {
  public:
   Watcher(pid_t child, const Options& options, const std::string& token)
@@ -82,9 +93,7 @@ class Watcher {
       before = now;
       advance(step);
     }
-    process::end_with_environment(entry_);
-    while (::waitpid(-1, nullptr, WNOHANG) > 0) {
-    }
+    end_descendants(entry_);
     return watched_;
   }
 
@@ -380,7 +389,7 @@ class Attempt {
     const std::uint64_t kills = find_memory_kills();
     const fs::path printed = options_.is_prediction ? work_ / "prediction.new" : fs::path();
     ::unlink((work_ / store::kResultFile).c_str());  // of an earlier attempt
-    const Watched watched = watch(start(*launch, work_, log, printed), options_, outcome_.token);
+    const Watched watched = watch(start(*launch, work_, log, printed, options_.solver), options_, outcome_.token);
     if (const std::optional<store::Progress> progress = store::read_progress(work_)) outcome_.percent = progress->percent;
     outcome_.exit_code = watched.exit_code;
     outcome_.peak_memory_gb = watched.peak_memory_gb;
@@ -413,7 +422,7 @@ class Attempt {
       outcome_.percent = 100.0;
       try {
         publish(store_, id_, work_, outcome_, find_report_options(options_));
-        process::end_with_environment("CARILLON_ATTEMPT=" + outcome_.token);
+        end_descendants("CARILLON_ATTEMPT=" + outcome_.token);
         store_.remove_work(id_);
         return 0;
       } catch (const std::exception& error) {
@@ -459,22 +468,6 @@ int run_attempt(const Options& options) {
     return kExitBusy;
   }
   return Attempt(options, store, id).run();
-}
-
-std::vector<std::string> make_arguments(const fs::path& program, const Options& options) {
-  std::vector<std::string> arguments{program, "attempt", options.work, "--ranks", std::to_string(options.ranks)};
-  const auto add = [&](const char* name, const std::string& value) { arguments.insert(arguments.end(), {name, value}); };
-  if (options.memory_gb > 0.0) add("--memory-gb", fmt::format("{}", options.memory_gb));
-  if (options.memory_limit_gb > 0.0) add("--memory-limit-gb", fmt::format("{}", options.memory_limit_gb));
-  if (options.time_limit_s > 0.0) add("--time-limit-s", fmt::format("{}", options.time_limit_s));
-  if (options.is_prediction) arguments.emplace_back("--predict");
-  for (const std::string& word : options.mpirun_options) arguments.push_back("--mpirun-option=" + word);
-  if (options.has_pictures) arguments.emplace_back("--pictures");
-  if (!options.token.empty()) add("--token", options.token);
-  if (options.launcher == Launcher::alone) add("--launcher", "alone");
-  if (options.launcher == Launcher::mpirun) add("--launcher", "mpirun");
-  if (options.launcher == Launcher::srun) add("--launcher", "srun");
-  return arguments;
 }
 
 }  // namespace carillon::attempt
