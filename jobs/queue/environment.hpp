@@ -52,6 +52,7 @@ struct EndedChild {
 struct StartOptions {
   double time_limit_s = 0.0;   // 0: none
   bool is_prediction = false;  // only predict time and memory
+  bool is_simulation = false;  // of carillon-simulate
   int signal_at_end = 0;       // sent to it when the starting thread ends; 0: it outlives this process
 };
 

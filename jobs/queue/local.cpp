@@ -56,11 +56,15 @@ pid_t LocalLauncher::start(const registry::Job& job, const StartOptions& options
   attempt.is_prediction = options.is_prediction;
   attempt.mpirun_options = command_.mpirun_options;
   attempt.has_pictures = command_.has_pictures;
+  const std::vector<std::string> words = attempt::make_arguments(command_.program, attempt);
   const std::filesystem::path log = attempt.work / store::kLogFile;
+  if (attempt.ranks == 1 && !options.is_simulation && options.signal_at_end == 0) {
+    if (const std::optional<pid_t> pid = worker_.start(log, words)) return *pid;
+  }
   const base::Descriptor output(::open(log.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0666));
   if (output.get() < 0) throw SystemError(fmt::format("{}: cannot write: {}", log.string(), std::strerror(errno)));
   // Signals stay pending until the attempt handles them.
-  return base::start({.words = attempt::make_arguments(command_.program, attempt),
+  return base::start({.words = words,
                       .output = output.get(),
                       .errors = output.get(),
                       .group = base::Command::Group::session,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "jobs/queue/environment.hpp"
+#include "jobs/queue/worker_client.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::queue {
@@ -41,7 +42,7 @@ struct AttemptCommand {
   std::vector<std::string> mpirun_options;  // arguments of mpirun
 };
 
-/// Starts attempts as children of this process, each in its own session.
+/// Starts attempts as children of this process, each in its own session; those of carillon-precompute on one rank by a worker.
 class LocalLauncher final : public Launcher {
  public:
   LocalLauncher(const store::Store& store, AttemptCommand command) : store_(store), command_(std::move(command)) {}
@@ -58,6 +59,7 @@ class LocalLauncher final : public Launcher {
  private:
   const store::Store& store_;
   const AttemptCommand command_;
+  WorkerClient worker_;
 };
 
 /// Disk, clock and launcher.

@@ -255,7 +255,7 @@ void Runner::start(const Job& job) {
   const JobNeeds needs = find_needs(job);
   blocked_since_.erase(job.id);
   asked_s_.erase(job.id);
-  const pid_t pid = at_.launcher.start(job, {needs.time_limit_s, needs.wants_prediction});
+  const pid_t pid = at_.launcher.start(job, {needs.time_limit_s, needs.wants_prediction, needs.is_simulation});
   children_.emplace(pid, job);
   name_worker(job, pid);
   display_.print_event(needs.wants_prediction ? "predict" : "start", job);

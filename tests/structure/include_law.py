@@ -222,7 +222,8 @@ RULES = {
     "jobs/front/explore": (["runtime/base", "runtime/material", "runtime/bank", "runtime/scene", "jobs/store"], ["fmt", "zlib"]),
     "jobs/front/hear": (["runtime/base", "runtime/material", "runtime/bank", "precompute/job", "jobs/store"], ["fmt"]),
     "jobs/front/cache": (["runtime/base", "precompute/job", "jobs/store"], ["fmt"]),
-    "jobs/queue/attempt": (["runtime/base", "runtime/bank", "jobs/store", "jobs/front"], ["fmt"]),
+    "jobs/queue/attempt": (["runtime/base", "runtime/bank", "jobs/store", "jobs/front"], ["cli", "fmt"]),
+    "jobs/queue/worker": (["runtime/base", "runtime/material", "precompute/petsc", "precompute/run"], ["cli", "fmt"]),
     "jobs/queue": (["runtime/base", "precompute/job", "jobs/store"], ["fmt"]),
     "jobs/queue/slurm": (["runtime/base", "precompute/job", "jobs/store"], ["fmt"]),
     "jobs/cli": (

@@ -11,7 +11,9 @@ import subprocess
 import sys
 import time
 
-from service import Service, check, is_alive
+import h5py
+
+from service import Service, check, is_alive, read
 
 LONG_NODES = 2500  # a solve of some seconds on one rank
 
@@ -257,6 +259,60 @@ def lost_claims(service):
     service.check_nothing_left()
 
 
+def worker(service):
+    """Jobs on one rank share a worker: the end of one process harms no other job, and banks are those of the program."""
+    service.mesh("bar.msh", LONG_NODES)
+    service.mesh("small.msh", 300)
+    job = {"resources": {"ranks": 1}}
+    crashing, other = service.submit(*(service.write_job(f"{hz}.json", "bar.msh", hz, **job) for hz in (30000, 25000)))
+    small = service.submit(*(service.write_job(f"{hz}.json", "small.msh", hz, **job) for hz in (8000, 9000, 10000)))
+    run = service.run("--cores", "2")
+
+    def find_ranks():
+        """{identity: rank} of the two long jobs, when both run."""
+        where = {os.path.basename(os.readlink(f"/proc/{pid}/cwd")): pid for pid in service.processes()["rank"]}
+        return {key: where[key] for key in (crashing, other) if key in where}
+
+    ranks = service.wait_for("two ranks", lambda: len(found := find_ranks()) == 2 and found)
+    (keeper,) = [pid for pid in map(int, filter(str.isdigit, os.listdir("/proc"))) if read_parent(pid, b"carillon-worker") == run.pid]
+    programs = {os.readlink(f"/proc/{pid}/exe") for pid in (keeper, *ranks.values())}
+    check(len(programs) == 1, f"ranks that are no forks of the worker: {programs}")
+    service.kill(ranks[crashing], signal.SIGSEGV)
+    service.wait_for("the crash to be seen", lambda: service.job(crashing)["state"] == "waiting")
+    check("Segmentation fault" in service.job(crashing)["reason"], f"no true reason: {service.job(crashing)}")
+    service.kill(keeper)
+    service.hurry()
+    check(service.wait_end(run) == 0, "carillon run ends badly")
+    jobs = service.jobs()
+    check(all(job["state"] == "done" for job in jobs.values()), f"{jobs}")
+    check([jobs[key]["attempts"] for key in (crashing, other, *small)] == [2, 1, 1, 1, 1], f"other jobs were harmed: {jobs}")
+    for name, identity in (("25000.json", other), ("8000.json", small[0])):
+        service.check_bank(identity)
+        subprocess.run([service.bin / "carillon-precompute", "-q", name, "--bank", "alone.hdf"], cwd=service.path, check=True)
+        check(read_bank(service.bank(identity)) == read_bank(service.path / "alone.hdf"), f"{name}: another bank than that of the program")
+    service.check_nothing_left()
+
+
+def read_parent(pid, name):
+    """The parent of a process with this name."""
+    stat = read(f"/proc/{pid}/stat")
+    return int(stat.rsplit(b")", 1)[1].split()[1]) if b"(" + name + b")" in stat else None
+
+
+def read_bank(file):
+    """Bytes of all numbers."""
+    found = {}
+
+    def take(name, item):
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu":
+            found[name] = item[()].tobytes()
+
+    with h5py.File(file) as bank:
+        bank.visititems(take)
+    check(len(found) > 5, f"{file}: {list(found)}")
+    return found
+
+
 def killed_before_publication(service):
     """An attempt killed between solve and publication: the next attempt publishes its bank; the job has a log."""
     service.mesh("bar.msh", 300)
@@ -276,7 +332,7 @@ def killed_before_publication(service):
 
 cases = {
     function.__name__: function
-    for function in (killed_before_publication, kills, hopeless, cancel, stop, time_limit, two_runs, disk_full, clock, hang, lost_claims)
+    for function in (worker, killed_before_publication, kills, hopeless, cancel, stop, time_limit, two_runs, disk_full, clock, hang, lost_claims)
 }
 service = Service(sys.argv[1])
 try:
