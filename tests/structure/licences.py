@@ -20,7 +20,7 @@ GROUPS = {
     "all": lambda name: True,
     "banks": lambda name: name not in ("carillon-mesh", "carillon-joints.so", "libcarillon_mpi_profile.so"),
     "sound": lambda name: name in ("carillon-render", "carillon-samples", "carillon-live", "_carillon", "carillon-simulate"),
-    "solver": lambda name: name in ("carillon-precompute", "carillon-simulate", "libcarillon_mpi_profile.so"),
+    "solver": lambda name: name in ("carillon-precompute", "carillon-worker", "carillon-simulate", "libcarillon_mpi_profile.so"),
 }
 # Link inputs of the engine and headers of its objects, with their names in the notices.
 LINKED = {

@@ -332,7 +332,20 @@ def killed_before_publication(service):
 
 cases = {
     function.__name__: function
-    for function in (worker, killed_before_publication, kills, hopeless, cancel, stop, time_limit, two_runs, disk_full, clock, hang, lost_claims)
+    for function in (
+        worker,
+        killed_before_publication,
+        kills,
+        hopeless,
+        cancel,
+        stop,
+        time_limit,
+        two_runs,
+        disk_full,
+        clock,
+        hang,
+        lost_claims,
+    )
 }
 service = Service(sys.argv[1])
 try:
