@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cstddef>
+#include <utility>
 
 #include "jobs/queue/attempt/launch.hpp"
 #include "runtime/base/command.hpp"
@@ -25,6 +26,7 @@ constexpr std::size_t kTitleBytes = 16 << 10;  // of the command line of an atte
 }  // namespace
 
 std::optional<pid_t> WorkerClient::start(const std::filesystem::path& log, const std::vector<std::string>& words) {
+  if (std::exchange(is_first_, false)) return std::nullopt;
   std::string message = log.string() + '\0';
   for (const std::string& word : words) message += word + '\0';
   if (message.size() > kTitleBytes || is_unusable_) return std::nullopt;

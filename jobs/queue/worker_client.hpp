@@ -27,6 +27,7 @@ class WorkerClient {
 
   base::Descriptor socket_;
   pid_t worker_ = 0;
+  bool is_first_ = true;
   bool is_unusable_ = false;  // does not start
 };
 

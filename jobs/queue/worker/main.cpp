@@ -120,6 +120,7 @@ int main(int argc, char** argv) {
     (void)material::MaterialTable::get_built_in();
     keep_descriptors();
     serve(session, title);
+    ::_exit(0);  // nothing is left to end
   } catch (const std::exception&) {
     return kExitSystem;
   }

@@ -264,8 +264,9 @@ def worker(service):
     service.mesh("bar.msh", LONG_NODES)
     service.mesh("small.msh", 300)
     job = {"resources": {"ranks": 1}}
-    crashing, other = service.submit(*(service.write_job(f"{hz}.json", "bar.msh", hz, **job) for hz in (30000, 25000)))
     small = service.submit(*(service.write_job(f"{hz}.json", "small.msh", hz, **job) for hz in (8000, 9000, 10000)))
+    crashing, other = service.submit(*(service.write_job(f"{hz}.json", "bar.msh", hz, **job) for hz in (30000, 25000)))
+    (last,) = service.submit(service.write_job("11000.json", "small.msh", 11000, **job))
     run = service.run("--cores", "2")
 
     def find_ranks():
@@ -285,8 +286,8 @@ def worker(service):
     check(service.wait_end(run) == 0, "carillon run ends badly")
     jobs = service.jobs()
     check(all(job["state"] == "done" for job in jobs.values()), f"{jobs}")
-    check([jobs[key]["attempts"] for key in (crashing, other, *small)] == [2, 1, 1, 1, 1], f"other jobs were harmed: {jobs}")
-    for name, identity in (("25000.json", other), ("8000.json", small[0])):
+    check([jobs[key]["attempts"] for key in (crashing, other, *small, last)] == [2, 1, 1, 1, 1, 1], f"other jobs were harmed: {jobs}")
+    for name, identity in (("25000.json", other), ("9000.json", small[1])):
         service.check_bank(identity)
         subprocess.run([service.bin / "carillon-precompute", "-q", name, "--bank", "alone.hdf"], cwd=service.path, check=True)
         check(read_bank(service.bank(identity)) == read_bank(service.path / "alone.hdf"), f"{name}: another bank than that of the program")
