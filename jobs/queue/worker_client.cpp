@@ -43,7 +43,7 @@ std::optional<pid_t> WorkerClient::start(const std::filesystem::path& log, const
 
 bool WorkerClient::make_worker() {
   std::array<int, 2> ends{};
-  ::prctl(PR_SET_CHILD_SUBREAPER, 1);  // attempts become children of this process
+  if (::prctl(PR_SET_CHILD_SUBREAPER, 1) != 0) return false;  // attempts become children of this process
   if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) return false;
   socket_ = base::Descriptor(ends[0]);
   const base::Descriptor other(ends[1]);
