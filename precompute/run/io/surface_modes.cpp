@@ -186,7 +186,7 @@ void SurfaceWork::quantise(std::size_t mode, std::size_t count) {
 /// Rank 0 orders the steps of all ranks by its vertices; fixed ones are 0.
 std::vector<std::int16_t> SurfaceWork::collect() {
   const std::size_t row = modes_ * 3;
-  const std::size_t rows_at_a_time = std::max<std::size_t>(1, kMessage / row);
+  const std::size_t rows_at_a_time = std::max<std::size_t>(1, kMessage / (row * sizeof(std::int16_t)));
   std::vector<std::int16_t> shape, arrived;
   comm_.agree([&] {
     if (!comm_.is_root()) return;
