@@ -1,6 +1,7 @@
 // Method: a Hertz pulse of the reduced mass that explains the engine's impulse; where modes would take more than 2 % of the blow, the
 // impact is integrated from the motions before it. If the engine's impulse is less than that of rigid bodies with the same motions, the
-// forces are scaled by the ratio: the engine knows nothing of the modes' momentum. Simultaneous hits of two bodies, as of both ends of
+// forces are scaled by the ratio: the engine knows nothing of the modes' momentum. They are reduced further if the modes would have more
+// energy than the blows have given, at the end or at any instant. Simultaneous hits of two bodies, as of both ends of
 // a tube, are one impact, together with the contacts on which these bodies rest.
 // Source: runtime/physics/impact; K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 #include "runtime/drive/hit_sounds.hpp"
@@ -13,6 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "runtime/base/groups.hpp"
 #include "runtime/physics/impact/impact.hpp"
 #include "runtime/physics/impact/predict.hpp"
 #include "runtime/physics/rigid/limits.hpp"
@@ -28,6 +30,7 @@ constexpr double kLongestImpactS = 20e-3;  // s
 constexpr double kLongestPulses = 50.0;    // an impact lasts at most this many Hertz times, for the sake of its cost,
 constexpr double kMostSteps = 5e4;         // or steps: its hits may be of very different lengths
 constexpr double kRingingShare = 0.01;     // of the speed of approach: impacts on bodies that ring faster are integrated
+constexpr int kPulsePieces = 16;           // of a Hertz pulse, for its energy at every instant
 constexpr double kRattleShare = 0.1;       // of that speed where bodies rattle: slower hits are part of it
 constexpr double kLongestRattleS = 0.1;    // s
 constexpr std::size_t kMaxTogether = 4;    // hits of an impact: its cost is cubic in them
@@ -43,16 +46,6 @@ double calc_modal_j(const impact::Modes& modes, const std::vector<double>& shape
   return sum;
 }
 
-/// Moves a modal state by a time of any sign as if it had no damping.
-void turn_undamped(const impact::Modes& modes, std::vector<double>& q, std::vector<double>& q_dot, double time_s) {
-  for (std::size_t i = 0; i < q.size(); ++i) {
-    const double omega = modes.get_omega()[i], c = std::cos(omega * time_s), s = std::sin(omega * time_s);
-    const double before = q[i];
-    q[i] = omega > 0.0 ? c * before + s / omega * q_dot[i] : before + time_s * q_dot[i];
-    q_dot[i] = c * q_dot[i] - omega * s * before;
-  }
-}
-
 std::vector<double> turn_shape(const Mat3& rotation, const std::vector<double>& shape) {
   std::vector<double> turned(shape.size());
   for (std::size_t i = 0; i + 2 < shape.size(); i += 3) {
@@ -64,23 +57,24 @@ std::vector<double> turn_shape(const Mat3& rotation, const std::vector<double>& 
 
 }  // namespace
 
-double HitSounds::Contact::calc_lost_j() const {
-  return 0.5 * mass_kg * speed_m_s * speed_m_s * std::max(kMinElasticShare, 1.0 - restitution * restitution);
-}
+double HitSounds::RigidBlow::calc_energy_j() const { return 0.5 * mass_kg * speed_m_s * speed_m_s; }
 
-double HitSounds::Contact::calc_part_j() const {
-  return 0.5 * hit.push_n_s * hit.approach_m_s * std::max(kMinElasticShare, 1.0 - restitution);
+double HitSounds::RigidBlow::calc_lost_j() const { return calc_energy_j() * std::max(kMinElasticShare, 1.0 - restitution * restitution); }
+
+HitSounds::RigidBlow HitSounds::make_rigid(const FinishedHit& hit) {
+  RigidBlow blow{.speed_m_s = std::max(hit.approach_m_s, rigid::kMinImpactSpeedMS)};
+  blow.restitution = std::clamp(hit.parting_m_s / blow.speed_m_s, 0.0, 1.0);
+  blow.mass_kg = hit.push_n_s / ((1.0 + blow.restitution) * blow.speed_m_s);
+  if (blow.mass_kg * hit.inverse_mass > 1.0) {  // the impulse came from elsewhere, or from several points
+    blow.mass_kg = 1.0 / hit.inverse_mass;
+    blow.speed_m_s = hit.push_n_s * hit.inverse_mass / (1.0 + blow.restitution);
+  }
+  return blow;
 }
 
 HitSounds::Contact HitSounds::make_contact(const StepView& step, const FinishedHit& hit) const {
   Contact c{.hit = hit, .blow = {.a = hit.a, .b = hit.b, .touch_s = hit.touch_s, .masked_s = hit.touch_s}};
-  c.speed_m_s = std::max(hit.approach_m_s, rigid::kMinImpactSpeedMS);
-  c.restitution = std::clamp(hit.parting_m_s / c.speed_m_s, 0.0, 1.0);
-  c.mass_kg = hit.push_n_s / ((1.0 + c.restitution) * c.speed_m_s);
-  if (c.mass_kg * hit.inverse_mass > 1.0) {  // the impulse came from elsewhere, or from several points
-    c.mass_kg = 1.0 / hit.inverse_mass;
-    c.speed_m_s = hit.push_n_s * hit.inverse_mass / (1.0 + c.restitution);
-  }
+  c.rigid = make_rigid(hit);
   double curvature = hit.curvature_per_m;
   if (!(curvature >= 0.0)) curvature = calc_curvatures(step, hit.a, hit.b, hit.stations_m, hit.outwards).calc_sum();
   c.compliance = step.scene.calc_compliance(hit.a, hit.b);
@@ -92,7 +86,7 @@ HitSounds::Contact HitSounds::make_contact(const StepView& step, const FinishedH
     geometry::Place& place = c.blow.places[side] = b.shape->find_place(hit.stations_m[side], hit.outwards[side]);
     if (b.modes) c.shapes[side] = bank::calc_shapes(*b.given.bank, place.triangle, place.barycentric);
   }
-  c.blow.duration_s = impact::calc_hertz_duration(c.compliance, c.radius_m, c.mass_kg, c.speed_m_s);
+  c.blow.duration_s = impact::calc_hertz_duration(c.compliance, c.radius_m, c.rigid.mass_kg, c.rigid.speed_m_s);
   c.blow.impulses_n_s = hit.impulses_n_s;
   c.blow.impulse_n_s = norm(hit.impulses_n_s[0]);
   for (const std::size_t side : {0, 1})
@@ -103,13 +97,38 @@ HitSounds::Contact HitSounds::make_contact(const StepView& step, const FinishedH
 }
 
 bool HitSounds::Contact::needs_modes() const {
-  const double elastic = 2.0 * mass_kg * speed_m_s / hit.push_n_s;
-  return (modal_j * elastic * elastic > kModalShare * 0.5 * mass_kg * speed_m_s * speed_m_s || ringing_m_s > kRingingShare * speed_m_s) &&
-         speed_m_s > kMinImpactSpeed && hit.approach_m_s > rigid::kMinImpactSpeedMS;
+  const double elastic = 2.0 * rigid.mass_kg * rigid.speed_m_s / hit.push_n_s;
+  return (modal_j * elastic * elastic > kModalShare * rigid.calc_energy_j() || ringing_m_s > kRingingShare * rigid.speed_m_s) &&
+         rigid.speed_m_s > kMinImpactSpeed && hit.approach_m_s > rigid::kMinImpactSpeedMS;
 }
 
-void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, LastingContacts& lasting, TouchesCounters& counters,
-                    std::vector<events::Event>& events) {
+/// Hits of a step that share a motion: each as an impact of its own may have more energy than its part of the loss, all together not.
+void HitSounds::share_energy(const StepView& step, std::vector<FinishedHit>& hits) {
+  if (hits.empty()) return;
+  base::Groups groups(static_cast<int>(step.bodies.size()));
+  for (const FinishedHit& hit : hits)
+    if (step.moves(hit.a) && step.moves(hit.b)) groups.join(hit.a, hit.b);
+  struct Sums {
+    double lost_j = 0.0, least_j = 0.0, alone_j = 0.0;
+  };
+  std::map<int, Sums> sums;  // by group
+  const auto find = [&](const FinishedHit& hit) -> Sums& { return sums[groups.find(step.moves(hit.a) ? hit.a : hit.b)]; };
+  for (const FinishedHit& hit : hits) {
+    if (hit.is_shared) continue;
+    Sums& sum = find(hit);
+    sum.lost_j += 0.5 * hit.push_n_s * (hit.approach_m_s - hit.parting_m_s);
+    sum.least_j += 0.5 * hit.push_n_s * hit.approach_m_s * kMinElasticShare;
+    sum.alone_j += make_rigid(hit).calc_lost_j();
+  }
+  for (FinishedHit& hit : hits) {
+    if (hit.is_shared) continue;
+    const Sums& sum = find(hit);
+    if (sum.alone_j > 0.0) hit.energy_share = std::min(1.0, std::max(sum.lost_j, sum.least_j) / sum.alone_j);
+  }
+}
+
+void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, double open_s, LastingContacts& lasting,
+                    TouchesCounters& counters, std::vector<events::Event>& events) {
   join_predicted(step, hits);
   const auto name = [&](int body) { return step.scene.get_matter(body).name_hash; };
   std::stable_sort(hits.begin(), hits.end(), [&](const FinishedHit& x, const FinishedHit& y) {
@@ -118,6 +137,7 @@ void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, Lastin
     if (x.touch_s != y.touch_s) return x.touch_s < y.touch_s;
     return std::pair(name(x.a), name(x.b)) < std::pair(name(y.a), name(y.b));
   });
+  share_energy(step, hits);
   impacts_left_ = step.options.max_impacts;
   const double oldest_s = step.scene.before_s - 2.0 * step.options.longest_hit_s;
   for (auto* times : {&included_s_, &rattles_s_}) std::erase_if(*times, [&](const auto& spot) { return spot.second < oldest_s; });
@@ -147,6 +167,7 @@ void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, Lastin
   }
   for (std::size_t first = 0; first < heard.size(); ++first)
     if (taken_[first] == 0 && !is_included(*heard[first])) sound(step, gather(step, heard, first), counters, events);
+  for (Ringing& ringing : ringing_) ringing.drop_forces(open_s);
 }
 
 /// The hit with the simultaneous ones of its bodies, if any of them needs modes; else the hit alone.
@@ -185,19 +206,45 @@ void HitSounds::sound(const StepView& step, const std::vector<Contact>& contacts
   }
   for (const Contact& c : contacts) {
     Blow blow = c.blow;
-    if (const double most_j = c.calc_lost_j(); c.modal_j > most_j) {
+    std::vector<StruckBody> struck;
+    if (c.needs_modes() || c.modal_j > c.hit.energy_share * c.rigid.calc_lost_j()) struck = find_struck(step, c);
+    const double share = c.hit.energy_share;
+    const double scale = limit_further(struck, 1.0, share * c.rigid.calc_energy_j(), share * c.rigid.calc_lost_j());
+    if (scale < 1.0) {
       ++counters.limited;
-      const double scale = std::sqrt(most_j / c.modal_j);
       for (Vec3& impulse : blow.impulses_n_s) impulse = scale * impulse;
       blow.impulse_n_s *= scale;
     }
-    if (add_pulses(step.scene, blow, &masks_, events) > 0) {
-      ++counters.hits;
-      excite(step, c, blow);
-    } else {
+    if (add_pulses(step.scene, blow, &masks_, events) == 0) {
       ++counters.masked;
+      continue;
+    }
+    ++counters.hits;
+    if (struck.empty()) excite(step, c, blow);
+    for (StruckBody& body : struck) {
+      for (ModalForce& force : body.further) force.scale(scale);
+      body.ringing->add(*body.modes, std::move(body.further));
     }
   }
+}
+
+/// The bodies of a Hertz pulse with its force on their modes.
+std::vector<StruckBody> HitSounds::find_struck(const StepView& step, const Contact& c) {
+  std::vector<StruckBody> struck;
+  for (const std::size_t side : {0, 1}) {
+    if (c.shapes[side].empty()) continue;
+    const int body = side == 0 ? c.hit.a : c.hit.b;
+    ModalForce force{.start_s = c.blow.touch_s, .step_s = c.blow.duration_s / kPulsePieces, .shape = c.shapes[side], .impulses_n_s = {}};
+    double sum = 0.0;
+    for (int k = 0; k < kPulsePieces; ++k) {
+      const double height = std::pow(std::sin(M_PI * (k + 0.5) / kPulsePieces), 1.5);
+      force.impulses_n_s.push_back(height * c.blow.impulses_n_s[side]);
+      sum += height;
+    }
+    force.scale(1.0 / sum);
+    struck.push_back({step.bodies[body].modes.get(), &ringing_[static_cast<std::size_t>(body)], {std::move(force)}});
+  }
+  return struck;
 }
 
 /// Sum over the modes of both bodies of their amplitudes at a contact along its normal: speed [m/s], or swing [m].
@@ -207,14 +254,14 @@ double HitSounds::calc_ringing(const StepView& step, const Contact& c, double ti
     const int body = side == 0 ? c.hit.a : c.hit.b;
     if (c.shapes[side].empty()) continue;
     const Ringing& ringing = ringing_[static_cast<std::size_t>(body)];
+    const ModalState& state = ringing.get_state();
     const std::vector<double>&omega = step.bodies[body].modes->get_omega(), &decay = step.bodies[body].given.bank->decay_per_s;
     const Vec3 normal = turn_back(c.hit.before[side].rotation, c.hit.normal);
-    for (std::size_t m = 0; m < ringing.q.size(); ++m) {
+    for (std::size_t m = 0; m < state.q.size(); ++m) {
       if (!(omega[m] > 0.0)) continue;
       const double* phi = &c.shapes[side][3 * m];
-      sum += std::abs(phi[0] * normal[0] + phi[1] * normal[1] + phi[2] * normal[2]) *
-             std::hypot(ringing.q[m], ringing.q_dot[m] / omega[m]) * (is_speed ? omega[m] : 1.0) *
-             std::exp(-decay[m] * std::max(0.0, time_s - ringing.time_s));
+      sum += std::abs(phi[0] * normal[0] + phi[1] * normal[1] + phi[2] * normal[2]) * std::hypot(state.q[m], state.q_dot[m] / omega[m]) *
+             (is_speed ? omega[m] : 1.0) * std::exp(-decay[m] * std::max(0.0, time_s - ringing.get_time_s()));
     }
   }
   return sum;
@@ -228,38 +275,27 @@ double HitSounds::find_rattle_end(const StepView& step, const Contact& c, double
   return time_s + kLongestRattleS * (last < 1.0 ? std::log(first) / std::log(first / last) : 1.0);
 }
 
-/// Modal state at a time. Before that of the last impact: without damping, so that the state after both has the sum of their motions.
-HitSounds::Ringing& HitSounds::find_ringing(const StepView& step, int body, double time_s) {
-  Ringing& ringing = ringing_[static_cast<std::size_t>(body)];
-  if (ringing.time_s > time_s + kLongestImpactS) ringing = {};  // the time was set back
-  if (!ringing.q.empty()) {
-    const impact::Modes& modes = *step.bodies[body].modes;
-    if (time_s > ringing.time_s) modes.move_freely(ringing.q, ringing.q_dot, time_s - ringing.time_s);
-    if (time_s < ringing.time_s) turn_undamped(modes, ringing.q, ringing.q_dot, time_s - ringing.time_s);
-  }
-  ringing.time_s = time_s;
-  return ringing;
-}
-
 /// Adds a pulse to the modal states of its bodies.
 void HitSounds::excite(const StepView& step, const Contact& c, const Blow& blow) {
   for (const std::size_t side : {0, 1}) {
     if (c.shapes[side].empty()) continue;
     const int body = side == 0 ? blow.a : blow.b;
-    const std::vector<double>& omega = step.bodies[body].modes->get_omega();
-    Ringing& ringing = find_ringing(step, body, blow.touch_s + 0.5 * blow.duration_s);
-    ringing.q.resize(omega.size());
-    ringing.q_dot.resize(omega.size());
+    const impact::Modes& modes = *step.bodies[body].modes;
+    const std::vector<double>& omega = modes.get_omega();
+    ModalState change{.q = std::vector<double>(omega.size()), .q_dot = std::vector<double>(omega.size())};
     const Vec3& impulse = blow.impulses_n_s[side];
     for (std::size_t m = 0; m < omega.size(); ++m) {
       const double* phi = &c.shapes[side][3 * m];
-      ringing.q_dot[m] += (phi[0] * impulse[0] + phi[1] * impulse[1] + phi[2] * impulse[2]) *
-                          std::sqrt(impact::calc_pulse_spectrum(omega[m] * blow.duration_s));
+      change.q_dot[m] = (phi[0] * impulse[0] + phi[1] * impulse[1] + phi[2] * impulse[2]) *
+                        std::sqrt(impact::calc_pulse_spectrum(omega[m] * blow.duration_s));
     }
+    Ringing& ringing = ringing_[static_cast<std::size_t>(body)];
+    (void)ringing.move_to(modes, blow.touch_s + 0.5 * blow.duration_s);
+    ringing.add({}, change);
   }
 }
 
-/// Body of an impact at touch_s, with the modal state that earlier impacts left.
+/// Body of an impact at touch_s, with the modal state that earlier hits left.
 impact::Body HitSounds::make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s) {
   const TouchBody& given = step.bodies[index];
   impact::Body body;
@@ -272,46 +308,50 @@ impact::Body HitSounds::make_body(const StepView& step, int index, const Motion&
   body.spin_rad_s = before.spin_rad_s;
   if (!has_modes) return body;
   body.modes = given.modes.get();
-  const Ringing& ringing = find_ringing(step, index, touch_s);
-  body.q = ringing.q;
-  body.q_dot = ringing.q_dot;
+  ModalState state = ringing_[static_cast<std::size_t>(index)].find_without_later(*body.modes, touch_s);
+  body.q = std::move(state.q);
+  body.q_dot = std::move(state.q_dot);
   return body;
 }
 
-/// Stores the modal states after an impact whose forces are scaled by a factor of at most `scale`, so that modes gain at most `most_j` [J].
-/// Returns the factor.
-double HitSounds::keep_ringing(std::span<const int> bodies, const impact::Impact& impact, const std::vector<impact::Body>& before,
-                               double touch_s, double scale, double most_j) {
+/// Stores the modal states after an impact that began at `touch_s` with the bodies `before`. Its forces, in `struck`, are scaled by a
+/// factor of at most `scale`, so that modes gain at most `most_j`, and `blow_j` while it lasts [J]. Returns the factor.
+double HitSounds::keep_ringing(const impact::Impact& impact, std::vector<impact::Body> before, std::vector<StruckBody>& struck,
+                               double touch_s, double scale, double blow_j, double most_j) {
   const impact::Books books = impact.get_books();
-  std::vector<impact::Body> free = before, after = impact.get_bodies();
+  const std::vector<impact::Body> after = impact.get_bodies();
+  std::vector<ModalState> changes;
   double at_first_j = 0.0, of_forces_j = books.above_band;
   for (std::size_t i = 0; i < after.size(); ++i) {
+    ModalState& change = changes.emplace_back();
     const impact::Modes* modes = after[i].modes;
     if (modes == nullptr) continue;
-    if (free[i].q.empty()) {
-      free[i].q.assign(after[i].q.size(), 0.0);
-      free[i].q_dot = free[i].q;
+    change = {after[i].q, after[i].q_dot};
+    if (!before[i].q.empty()) {
+      at_first_j += modes->calc_energy(before[i].q, before[i].q_dot);
+      modes->move_freely(before[i].q, before[i].q_dot, impact.get_time());
+      for (std::size_t m = 0; m < change.q.size(); ++m) {
+        change.q[m] -= before[i].q[m];
+        change.q_dot[m] -= before[i].q_dot[m];
+      }
     }
-    at_first_j += modes->calc_energy(free[i].q, free[i].q_dot);
-    modes->move_freely(free[i].q, free[i].q_dot, impact.get_time());
-    for (std::size_t m = 0; m < free[i].q.size(); ++m) {
-      after[i].q[m] -= free[i].q[m];
-      after[i].q_dot[m] -= free[i].q_dot[m];
-    }
-    of_forces_j += modes->calc_energy(after[i].q, after[i].q_dot);
+    of_forces_j += modes->calc_energy(change.q, change.q_dot);
   }
   const double gain_j = books.modal + books.dissipated_modes + books.above_band - at_first_j;
   if (at_first_j == 0.0) of_forces_j = gain_j;
-  const double shared_j = gain_j - of_forces_j;  // work on the earlier motion; a factor x gains shared x + of_forces x^2
-  if (of_forces_j > 0.0 && scale * (shared_j + scale * of_forces_j) > most_j)
-    scale = (std::sqrt(shared_j * shared_j + 4.0 * of_forces_j * most_j) - shared_j) / (2.0 * of_forces_j);
+  // The work on the earlier motion is in proportion to the forces.
+  scale = limit_factor(scale, gain_j - of_forces_j, std::max(of_forces_j, 0.0), most_j);
+  // During an impact alone, its own books keep the energy below that of the blow.
+  if (std::any_of(struck.begin(), struck.end(), [&](const StruckBody& s) { return s.modes && s.ringing->has_later(touch_s); }))
+    scale = limit_further(struck, scale, blow_j, most_j);
   for (std::size_t i = 0; i < after.size(); ++i) {
     if (after[i].modes == nullptr) continue;
-    for (std::size_t m = 0; m < free[i].q.size(); ++m) {
-      free[i].q[m] += scale * after[i].q[m];
-      free[i].q_dot[m] += scale * after[i].q_dot[m];
-    }
-    ringing_[static_cast<std::size_t>(bodies[i])] = {std::move(free[i].q), std::move(free[i].q_dot), touch_s + impact.get_time()};
+    StruckBody& body = struck[i];
+    for (double& q : changes[i].q) q *= scale;
+    for (double& speed : changes[i].q_dot) speed *= scale;
+    for (ModalForce& force : body.further) force.scale(scale);
+    (void)body.ringing->move_to(*body.modes, touch_s + impact.get_time());
+    body.ringing->add(std::move(body.further), changes[i]);
   }
   return scale;
 }
@@ -385,12 +425,13 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits
                           std::vector<events::Event>& events) {
   const FinishedHit& first = hits.front().hit;
   impacts_left_ -= static_cast<int>(hits.size());
-  double touch_s = first.touch_s, longest_s = 0.0, wanted = 0.0, most_j = 0.0;
+  double touch_s = first.touch_s, longest_s = 0.0, wanted = 0.0, blow_j = 0.0, most_j = 0.0;
   for (const Contact& c : hits) {
     touch_s = std::min(touch_s, c.hit.touch_s);
     longest_s = std::max(longest_s, kLongestPulses * c.blow.duration_s);
     wanted += c.hit.push_n_s;
-    most_j += hits.size() > 1 ? c.calc_part_j() : c.calc_lost_j();
+    blow_j += c.hit.energy_share * c.rigid.calc_energy_j();
+    most_j += c.hit.energy_share * c.rigid.calc_lost_j();
   }
   std::vector<Contact> contacts = hits;
   for (const FinishedHit& support : first.supports) {
@@ -445,12 +486,24 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits
   }
   const std::vector<impact::Pulse> pulses = impact->take_pulses();
   if (pulses.empty()) return false;
-  std::vector<const FinishedHit*> struck;
-  for (const Contact& c : hits) struck.push_back(&c.hit);
-  const std::vector<double> pushes = calc_rigid_pushes(step, struck);
+  std::vector<const FinishedHit*> together;
+  for (const Contact& c : hits) together.push_back(&c.hit);
+  const std::vector<double> pushes = calc_rigid_pushes(step, together);
   const double rigid = std::accumulate(pushes.begin(), pushes.end(), 0.0);
   const double largest = rigid > 0.0 ? std::min(1.0, wanted / rigid) : 1.0;
-  const double scale = keep_ringing(names, *impact, bodies, touch_s, largest, most_j);
+  std::vector<StruckBody> struck;
+  for (std::size_t i = 0; i < names.size(); ++i) struck.push_back({bodies[i].modes, &ringing_[static_cast<std::size_t>(names[i])], {}});
+  for (const impact::Pulse& pulse : pulses) {
+    const Contact& c = contacts[static_cast<std::size_t>(pulse.contact)];
+    for (const std::size_t side : {0, 1}) {
+      if (c.shapes[side].empty()) continue;
+      ModalForce force{.start_s = touch_s + pulse.start_s, .step_s = pulse.step_s, .shape = c.shapes[side], .impulses_n_s = {}};
+      for (const Vec3& impulse : pulse.impulse_n_s)
+        force.impulses_n_s.push_back(turn_back(c.hit.before[side].rotation, side == 0 ? impulse : -1.0 * impulse));
+      struck[static_cast<std::size_t>(find_body(c, side))].further.push_back(std::move(force));
+    }
+  }
+  const double scale = keep_ringing(*impact, bodies, struck, touch_s, largest, blow_j, most_j);
   if (scale < largest) ++counters.limited;
   counters.impacts += std::ssize(hits);
   for (const Contact& c : std::span(contacts).subspan(hits.size())) included_s_[c.hit.spot] = first.end_s;

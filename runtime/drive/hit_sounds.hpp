@@ -8,12 +8,14 @@
 
 #include "runtime/drive/lasting.hpp"
 #include "runtime/drive/pulses.hpp"
+#include "runtime/drive/ringing.hpp"
 #include "runtime/drive/touch_spots.hpp"
 #include "runtime/physics/impact/impact.hpp"
 
 namespace carillon::drive {
 
-/// Invariant: no hit gives the modes of its bodies more energy than it took from their motion.
+/// Invariant: no hit gives the modes of its bodies more energy than it took from their motion, and at no instant more than that of the
+/// blow.
 class HitSounds {
  public:
   void resize(int bodies) {
@@ -25,8 +27,8 @@ class HitSounds {
     ringing_[static_cast<std::size_t>(body)] = {};
   }
 
-  /// Sounds the hits of a step, strongest first. Appends events and notifies `lasting`.
-  void add(const StepView& step, std::vector<FinishedHit>& hits, LastingContacts& lasting, TouchesCounters& counters,
+  /// Sounds the hits of a step, strongest first. `open_s`: later ones touch no earlier. Appends events and notifies `lasting`.
+  void add(const StepView& step, std::vector<FinishedHit>& hits, double open_s, LastingContacts& lasting, TouchesCounters& counters,
            std::vector<events::Event>& events);
   /// True while ringing bodies rattle at a position after an impact there: nothing rests on it.
   bool is_rattling(std::uint64_t spot, double time_s) const {
@@ -35,42 +37,45 @@ class HitSounds {
   }
 
  private:
-  /// Modal state of a body after its last hit; empty: at rest.
-  struct Ringing {
-    std::vector<double> q, q_dot;
-    double time_s = 0.0;
+  /// A hit as an impact of two points.
+  struct RigidBlow {
+    double mass_kg = 0.0, speed_m_s = 0.0, restitution = 0.0;
+
+    /// Kinetic energy before [J].
+    double calc_energy_j() const;
+    /// Of it lost [J], at least 1 %.
+    double calc_lost_j() const;
   };
 
   /// A hit and the properties of its pulse.
   struct Contact {
     const FinishedHit& hit;
-    double mass_kg = 0.0, speed_m_s = 0.0, restitution = 0.0, radius_m = 0.0, compliance = 0.0;
+    RigidBlow rigid{};
+    double radius_m = 0.0, compliance = 0.0;
     Blow blow{};                                  // the hit as a Hertz pulse,
     double modal_j = 0.0;                         // and the energy it would give to the modes
     std::array<std::vector<double>, 2> shapes{};  // (n, 3) at the places of the blow, mesh axes; empty: no modes
     double ringing_m_s = 0.0;                     // speed of the surfaces by earlier hits, amplitudes added
 
-    /// Kinetic energy lost [J], at least 1 % of the blow.
-    double calc_lost_j() const;
-    /// The same for one of several simultaneous hits, from its share of the impulse.
-    double calc_part_j() const;
     /// True if the hit must be integrated with the modes of its bodies.
     bool needs_modes() const;
   };
 
+  static RigidBlow make_rigid(const FinishedHit& hit);
+  static void share_energy(const StepView& step, std::vector<FinishedHit>& hits);
   Contact make_contact(const StepView& step, const FinishedHit& hit) const;
   double calc_ringing(const StepView& step, const Contact& contact, double time_s, bool is_speed) const;
   double find_rattle_end(const StepView& step, const Contact& contact, double time_s) const;
-  Ringing& find_ringing(const StepView& step, int body, double time_s);
   void excite(const StepView& step, const Contact& contact, const Blow& blow);
   std::vector<Contact> gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first);
   void sound(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
+  std::vector<StruckBody> find_struck(const StepView& step, const Contact& contact);
   static std::vector<double> calc_rigid_pushes(const StepView& step, std::span<const FinishedHit* const> hits);
   static void join_predicted(const StepView& step, std::vector<FinishedHit>& hits);
   bool integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
   impact::Body make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s);
-  double keep_ringing(std::span<const int> bodies, const impact::Impact& impact, const std::vector<impact::Body>& before, double touch_s,
-                      double scale, double most_j);
+  static double keep_ringing(const impact::Impact& impact, std::vector<impact::Body> before, std::vector<StruckBody>& struck,
+                             double touch_s, double scale, double blow_j, double most_j);
   static void add_forces(const StepView& step, const Contact& contact, double touch_s, std::size_t index,
                          std::span<const impact::Pulse> pulses, double scale, std::vector<events::Event>& events);
 

@@ -21,6 +21,7 @@ struct FinishedHit {
   double approach_m_s = 0.0, parting_m_s = 0.0;  // before and after; parting >= 0
   double inverse_mass = 0.0;                     // 1/m_eff along the normal [1/kg]
   double push_n_s = 0.0;                         // along the normal, without weight
+  double energy_share = 1.0;                     // at most this part of m v^2/2 is its own, as further hits share the motion
   bool is_predicted = false;                     // the impulse is that of a rigid impact at this point alone
   double curvature_per_m = 0.0;                  // NaN: unknown
   Vec3 normal{};                                 // world, from b to a

@@ -273,13 +273,14 @@ bool Touches::Course::step(double time_s, std::span<const TouchesPose> poses, st
   for (const FinishedHit& hit : hits_)
     for (const int body : {hit.a, hit.b})
       if (body >= 0) stirred_[body] = 2;
-  sounds_.add(view, hits_, lasting_, counters_, events_);
+  const double open_s = spots_.find_first_open(scene_.time_s);
+  sounds_.add(view, hits_, open_s, lasting_, counters_, events_);
   for (Load& load : loads_) load.rattles = sounds_.is_rattling(load.spot, scene_.time_s);
   lasting_.update(scene_, loads_, true, events_);
   counters_.touches = lasting_.count_begun();
   add_motions(scene_.time_s - moved_s_ >= kMotionS - 1e-9);
   for (TouchBody& body : bodies_) body.is_new = false;
-  hand_over(spots_.find_first_open(scene_.time_s));
+  hand_over(open_s);
   return flush();
 }
 

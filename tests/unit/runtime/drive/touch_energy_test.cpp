@@ -1,7 +1,13 @@
 // Energy that hits give to modes: never above the loss of kinetic energy.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <random>
 #include <utility>
+#include <vector>
 
 #include "tests/unit/runtime/drive/modal_energy.hpp"
 #include "tests/unit/runtime/physics/plate_bank.hpp"
@@ -70,7 +76,7 @@ TEST(TouchEnergy, HitsOfAStepShareTheMotion) {
   const double moved_kg = 0.25 * plate.rigid.mass_kg, lost_j = 0.5 * moved_kg * (1.0 - e * e);
   for (const bool early : {false, true}) {
     for (const double gap : {0.0, 1e-3, 5e-3}) {
-      Rig rig({.early = early, .ground_restitution = e});
+      Rig rig({.early = early, .gravity_m_s2 = {}, .ground_restitution = e});
       rig.add(plate, "plate", {0, 0, 0.5 * thickness}, {0, 0, -0.25}, e);
       rig.poses[0].spin_rad_s[1] = 7.5;  // the motion that a blow on the edge gives: 1 m/s there
       rig.start();
@@ -85,6 +91,87 @@ TEST(TouchEnergy, HitsOfAStepShareTheMotion) {
       EXPECT_GT(calc_modal_j(rig, plate, 0), 0.05 * lost_j) << early << " " << gap;
       EXPECT_LE(calc_modal_j(rig, plate, 0), 1.01 * lost_j) << early << " " << gap;
     }
+  }
+}
+
+/// A blow on corners of a plate.
+struct CornerBlow {
+  double touch_s = 0.0, energy_j = 0.0, lost_j = 0.0;  // energy: of the motion along the contacts, all of it lost by e = 0
+};
+
+/// Gives a plate a random motion, and strikes in a step of `dt_s` corners that move down, all within that step. Without gravity.
+CornerBlow strike_corners(Rig& rig, const bank::Bank& plate, double e, double dt_s, std::mt19937& chance) {
+  const auto choose = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(chance); };
+  const double mass = plate.rigid.mass_kg, along_x = plate.rigid.inertia_kg_m2[0], along_y = plate.rigid.inertia_kg_m2[4];
+  TouchesPose& pose = rig.poses[0];
+  pose.velocity_m_s = {0, 0, -choose(0.0, 1.0)};
+  pose.spin_rad_s = {choose(-8.0, 8.0), choose(-8.0, 8.0), 0.0};
+  rig.step(1e-6, {});
+  const auto calc_speed = [&](const Vec3& corner) {
+    return pose.velocity_m_s[2] + pose.spin_rad_s[0] * corner[1] - pose.spin_rad_s[1] * corner[0];
+  };
+  std::vector<TouchPoint> points;
+  std::vector<double> speeds;
+  for (const double x : {-0.1, 0.1})
+    for (const double y : {-0.1, 0.1}) {
+      const Vec3 corner{x, y, 0.0};
+      const double speed = -calc_speed(corner);
+      if (speed < 0.1 || chance() % 4 == 0) continue;
+      points.push_back(on_ground(0, corner, 0.0));
+      points.back().gap_m = chance() % 2 == 0 ? 0.0 : choose(0.0, 0.9) * dt_s * speed;
+      speeds.push_back(speed);
+    }
+  const auto calc_motion_j = [&] {
+    return 0.5 * (mass * pose.velocity_m_s[2] * pose.velocity_m_s[2] + along_x * pose.spin_rad_s[0] * pose.spin_rad_s[0] +
+                  along_y * pose.spin_rad_s[1] * pose.spin_rad_s[1]);
+  };
+  CornerBlow blow{.touch_s = rig.time_s + dt_s, .lost_j = calc_motion_j()};
+  for (int sweep = 0; sweep < 500; ++sweep)
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Vec3& at = points[i].point_m;
+      const double inverse = 1.0 / mass + at[1] * at[1] / along_x + at[0] * at[0] / along_y;
+      const double push = std::max(-points[i].impulse_n_s, (e * speeds[i] - calc_speed(at)) / inverse);
+      points[i].impulse_n_s += push;
+      pose.velocity_m_s[2] += push / mass;
+      pose.spin_rad_s[0] += push * at[1] / along_x;
+      pose.spin_rad_s[1] -= push * at[0] / along_y;
+    }
+  blow.lost_j -= calc_motion_j();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points[i].impulse_n_s > 0.0) blow.touch_s = std::min(blow.touch_s, rig.time_s + points[i].gap_m / speeds[i]);
+    blow.energy_j += 0.5 * points[i].impulse_n_s * speeds[i] / (1.0 + e);
+  }
+  rig.step(dt_s, points);
+  return blow;
+}
+
+TEST(TouchEnergy, NoInstantExceedsTheBlows) {
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    std::mt19937 chance(seed);
+    const double thickness = std::array{0.5e-3, 1e-3, 2e-3, 5e-3}[chance() % 4], e = std::array{0.0, 0.2, 0.5, 0.9}[chance() % 4];
+    const bank::Bank plate = physics::tests::make_plate_bank(0.2, thickness, 8000.0, 8, 1e-6);
+    const double dt_s = std::exp(std::uniform_real_distribution<double>(std::log(1e-4), std::log(1.0 / 30.0))(chance));
+    Rig rig({.early = chance() % 2 == 0, .max_impacts = std::array{0, 1, 3, 8}[chance() % 4], .gravity_m_s2 = {}, .ground_restitution = e});
+    rig.add(plate, "plate", {0, 0, 0.5 * thickness}, {}, e);
+    rig.start();
+    std::vector<CornerBlow> blows;
+    for (unsigned n = 0; n <= seed % 5; ++n) {
+      blows.push_back(strike_corners(rig, plate, e, dt_s, chance));
+      for (unsigned wait = chance() % 3; wait > 0; --wait) rig.step(dt_s, {});
+    }
+    for (int n = 0; n < 20; ++n) rig.step(5e-3, {});
+    const auto course = list_modal_j(rig, plate, 0);
+    if (course.empty()) continue;
+    double lost_j = 0.0, worst = 0.0;
+    for (const CornerBlow& blow : blows) lost_j += std::max(blow.lost_j, 0.01 * blow.energy_j);
+    for (const auto& [time_s, modal_j] : course) {
+      double blows_j = 0.0;
+      for (const CornerBlow& blow : blows) blows_j += blow.touch_s <= time_s + 1e-9 ? blow.energy_j : 0.0;
+      worst = std::max(worst, modal_j / blows_j);
+    }
+    EXPECT_LE(worst, 1.01) << seed;
+    EXPECT_LE(course.back().second, 1.01 * lost_j) << seed;
+    EXPECT_TRUE(rig.faults.empty()) << seed;
   }
 }
 
