@@ -15,11 +15,13 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/render/live/commands.hpp"
 #include "runtime/render/live/device.hpp"
 #include "runtime/render/live/osc.hpp"
+#include "runtime/render/live/warning_limit.hpp"
 #include "runtime/render/render.hpp"
 #include "runtime/render/stage.hpp"
 #include "runtime/render/surface_playback.hpp"
@@ -52,7 +54,7 @@ class CommandInput {
       for (const std::string& line : reader_->read())
         if (!take([&] { return split(line); })) return false;
     if (port_)
-      for (const Words& words : port_->read([&](const std::string& reason) { refuse("OSC packet ignored: " + reason); }))
+      for (const Words& words : port_->read([&](const std::string& reason) { refuse("OSC packet ignored: " + reason, packets_); }))
         if (!take([&] { return words; })) return false;
     return true;
   }
@@ -64,8 +66,6 @@ class CommandInput {
   }
 
  private:
-  static constexpr int kMaxWarnings = 100;
-
   template <class GetWords>
   bool take(GetWords&& get_words) {
     try {
@@ -76,19 +76,22 @@ class CommandInput {
         std::fflush(stdout);
       }
     } catch (const InputError& error) {
-      refuse(error.what());
+      refuse(error.what(), commands_);
     }
     return true;
   }
-  void refuse(const std::string& reason) {
-    if (++refused_ <= kMaxWarnings) warn({reason});
-    if (refused_ == kMaxWarnings) warn({"further rejected commands are only counted"});
+  /// A flood of packets that are none leaves room for the warnings of commands.
+  void refuse(const std::string& reason, WarningLimit& limit) {
+    ++refused_;
+    const std::int64_t left_out = limit.pass(base::get_steady_s());
+    if (left_out >= 0) warn({left_out == 0 ? reason : fmt::format("{}; before it {} more were only counted", reason, left_out)});
   }
 
   Hands hands_;
   std::optional<LineReader> reader_;
   std::optional<OscPort> port_;
   std::int64_t refused_ = 0;
+  WarningLimit packets_, commands_;
 };
 
 void print_statistics(const DeviceStatistics& card, const synth::SynthesiserCounters& counters, render::Stage& stage, double rate_hz) {

@@ -218,6 +218,27 @@ class Live(unittest.TestCase):
             self.assertEqual((refused.returncode, refused.stderr.count("\n")), (2, 1), refused.stderr)
             self.assertIn("is no port; give one like 9000", refused.stderr)
 
+    def test_a_flood_of_garbage_hides_no_error_of_a_command(self):
+        scene = {**json.loads(self.scene.read_text()), "duration_s": 60.0, "strikes": []}
+        path = self.root / "flood.json"
+        path.write_text(json.dumps(scene))
+        words = [BIN / "carillon-live", path, "--null", "--osc", "0", "--look-ahead", "0.05"]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as player:
+            to = ("127.0.0.1", int(player.stdout.readline().split()[-1]))
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+                for _ in range(5):
+                    for _ in range(100):
+                        out.sendto(b"garbage", to)
+                    time.sleep(0.02)
+                for name in ("cubf", "cubg"):
+                    out.sendto(osc("/push", name, 0, 0, 1), to)
+                out.sendto(osc("/quit"), to)
+            printed, errors = player.communicate(timeout=20)
+        self.assertEqual(player.returncode, 0, errors)
+        self.assertEqual(errors.count('mean "cube"'), 2, errors)
+        self.assertIn(errors.count("OSC packet ignored: "), range(10, 13))
+        self.assertGreater(int(re.search(r"OSC +(\d+) commands or packets rejected", printed)[1]), 200)
+
     def test_commands_move_bodies(self):
         scene = json.loads(self.scene.read_text())
         scene["duration_s"] = 60.0
