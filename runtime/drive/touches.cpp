@@ -391,6 +391,7 @@ void Touches::Course::hand_over(double mark_s) {
     if (std::holds_alternative<events::LastingContact>(event)) ++counters_.records;
     waiting_.push_back(event);
   }
+  if (!waiting_.empty() && std::holds_alternative<events::TimeWatermark>(waiting_.back())) waiting_.pop_back();  // the new one says more
   waiting_.push_back(events::TimeWatermark{mark_s});
   last_mark_s_ = mark_s;
   for (; waiting_.size() > kMaxWaiting; waiting_.pop_front()) ++counters_.lost;

@@ -48,6 +48,33 @@ TEST(Touches, OneHitInAnyNumberOfStepsIsOnePulse) {
   }
 }
 
+/// An ideal spring of half a period of 1 ms sends the ball back with its speed, in up to 10,000 steps.
+TEST(Touches, SpringContactsInStepsDownTo100Ns) {
+  const bank::Bank ball = make_ball(kRadius);
+  const double period = 1e-3, omega = M_PI / period, mass = ball.rigid.mass_kg;
+  for (const double dt : {1e-5, 1e-6, 1e-7})
+    for (const bool is_after : {false, true}) {
+      Rig rig({.points_after = is_after, .compliant = true, .gravity_m_s2 = {}});
+      rig.add(ball, "ball", {0, 0, kRadius}, {0, 0, -1.0});
+      rig.start();
+      double depth = 0.0;
+      const int steps = static_cast<int>(std::lround(period / dt));
+      for (int n = 1; n <= steps; ++n) {
+        const double before = depth, speed = -std::cos(omega * n * dt);
+        depth = std::sin(omega * n * dt) / omega;
+        TouchPoint point = on_ground(0, {}, mass * (speed - rig.poses[0].velocity_m_s[2]));
+        point.gap_m = is_after ? -depth : -before;
+        rig.poses[0].velocity_m_s[2] = speed;
+        rig.poses[0].position_m[2] = kRadius - depth;
+        rig.step(dt, {point});
+      }
+      for (int n = 0; n < 20; ++n) rig.step(1e-3, {});
+      ASSERT_EQ(rig.list<events::Impulse>().size(), 1U) << dt << is_after;
+      EXPECT_NEAR(rig.sum_impulses(0)[2], 2.0 * mass, 2e-3 * 2.0 * mass) << dt << is_after;
+      EXPECT_TRUE(rig.faults.empty());
+    }
+}
+
 TEST(Touches, HitsInsideAStepBeginAtTheTouchWithItsSpeed) {
   // The ball falls 8 mm and bounces, all within one step, as in sums over the internal steps of an engine.
   const bank::Bank ball = make_ball(kRadius);
@@ -508,7 +535,10 @@ TEST(Touches, EventsWaitForRoom) {
   std::vector<TouchesPose> poses(1);
   touches.start(0.0, poses);
   EXPECT_FALSE(touches.step(0.01, poses, {}));
-  EXPECT_GT(touches.get_counters().waiting, 0);
+  const std::int64_t waiting = touches.get_counters().waiting;
+  EXPECT_GT(waiting, 0);
+  for (int n = 1; n <= 1000; ++n) EXPECT_FALSE(touches.step(0.01 + 1e-7 * n, poses, {}));
+  EXPECT_EQ(touches.get_counters().waiting, waiting) << "the last mark replaces those before it";
   EXPECT_EQ(touches.get_mark_s(), 0.0) << "what waits has not been passed on";
   room = 1000;
   EXPECT_TRUE(touches.step(0.02, poses, {}));
