@@ -36,7 +36,6 @@ WANTED_WAYS = {"found_db": 1.5, "early_db": 1.5}
 LIMITS = {
     "bullet": {("slide", 60): {"windows_db": 3.75}},
     "mujoco": {("rod", 60): {"windows_db": 3.5}, ("rod", 1000): {"windows_db": 3.25}},
-    "own": {("pile", 60): {"windows_db": 4.0}},
 }
 LEFT_OUT = {
     "simbody": ("pile", "bead"),  # its contact of boxes needs meshes, which cost 10 CPU s per s
