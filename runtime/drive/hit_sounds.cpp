@@ -420,13 +420,31 @@ void HitSounds::join_predicted(const StepView& step, std::vector<FinishedHit>& h
   }
 }
 
+/// Gives bodies of an impact that began at `touch_s` its forces on their modes. `springs`: contacts with the indices of the bodies.
+void HitSounds::add_modal_forces(std::span<const Contact> contacts, std::span<const impact::Contact> springs,
+                                 std::span<const impact::Pulse> pulses, double touch_s, std::vector<StruckBody>& struck) {
+  for (const impact::Pulse& pulse : pulses) {
+    const auto index = static_cast<std::size_t>(pulse.contact);
+    const Contact& c = contacts[index];
+    for (const std::size_t side : {0, 1}) {
+      if (c.shapes[side].empty()) continue;
+      ModalForce force{.start_s = touch_s + pulse.start_s, .step_s = pulse.step_s, .shape = c.shapes[side], .impulses_n_s = {}};
+      for (const Vec3& impulse : pulse.impulse_n_s)
+        force.impulses_n_s.push_back(turn_back(c.hit.before[side].rotation, side == 0 ? impulse : -1.0 * impulse));
+      struck[static_cast<std::size_t>(side == 0 ? springs[index].a : springs[index].b)].further.push_back(std::move(force));
+    }
+  }
+}
+
 /// False if it cannot be integrated: nothing is appended. As in our own contact, supported bodies are struck together with their supports.
 bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits, TouchesCounters& counters,
                           std::vector<events::Event>& events) {
   const FinishedHit& first = hits.front().hit;
   impacts_left_ -= static_cast<int>(hits.size());
   double touch_s = first.touch_s, longest_s = 0.0, wanted = 0.0, blow_j = 0.0, most_j = 0.0;
+  std::vector<const FinishedHit*> together;
   for (const Contact& c : hits) {
+    together.push_back(&c.hit);
     touch_s = std::min(touch_s, c.hit.touch_s);
     longest_s = std::max(longest_s, kLongestPulses * c.blow.duration_s);
     wanted += c.hit.push_n_s;
@@ -456,13 +474,12 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const Contact& c = contacts[i];
     const FinishedHit& hit = c.hit;
-    const bool is_support = i >= hits.size();
     impact::Contact& contact = springs.emplace_back();
     contact.a = find_body(c, 0);
     contact.b = find_body(c, 1);
     contact.where_m = hit.before[0].centre_m + hit.before[0].rotation * (hit.stations_m[0] - step.scene.bodies[hit.a].centre_m);
     contact.normal = hit.normal;
-    contact.gap_m = is_support ? 0.0 : (hit.touch_s - touch_s) * hit.approach_m_s;
+    contact.gap_m = i < hits.size() ? (hit.touch_s - touch_s) * hit.approach_m_s : 0.0;  // supports are closed
     contact.spring.stiffness = impact::calc_hertz_stiffness(c.compliance, c.radius_m);
     contact.restitution = step.calc_restitution(hit.a, hit.b);
     contact.is_limit = true;
@@ -486,23 +503,12 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits
   }
   const std::vector<impact::Pulse> pulses = impact->take_pulses();
   if (pulses.empty()) return false;
-  std::vector<const FinishedHit*> together;
-  for (const Contact& c : hits) together.push_back(&c.hit);
   const std::vector<double> pushes = calc_rigid_pushes(step, together);
   const double rigid = std::accumulate(pushes.begin(), pushes.end(), 0.0);
   const double largest = rigid > 0.0 ? std::min(1.0, wanted / rigid) : 1.0;
   std::vector<StruckBody> struck;
-  for (std::size_t i = 0; i < names.size(); ++i) struck.push_back({bodies[i].modes, &ringing_[static_cast<std::size_t>(names[i])], {}});
-  for (const impact::Pulse& pulse : pulses) {
-    const Contact& c = contacts[static_cast<std::size_t>(pulse.contact)];
-    for (const std::size_t side : {0, 1}) {
-      if (c.shapes[side].empty()) continue;
-      ModalForce force{.start_s = touch_s + pulse.start_s, .step_s = pulse.step_s, .shape = c.shapes[side], .impulses_n_s = {}};
-      for (const Vec3& impulse : pulse.impulse_n_s)
-        force.impulses_n_s.push_back(turn_back(c.hit.before[side].rotation, side == 0 ? impulse : -1.0 * impulse));
-      struck[static_cast<std::size_t>(find_body(c, side))].further.push_back(std::move(force));
-    }
-  }
+  for (std::size_t i = 0; i < names.size(); ++i) struck.push_back({bodies[i].modes, &ringing_[names[i]], {}});
+  add_modal_forces(contacts, springs, pulses, touch_s, struck);
   const double scale = keep_ringing(*impact, bodies, struck, touch_s, largest, blow_j, most_j);
   if (scale < largest) ++counters.limited;
   counters.impacts += std::ssize(hits);

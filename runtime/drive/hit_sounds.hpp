@@ -76,6 +76,8 @@ class HitSounds {
   impact::Body make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s);
   static double keep_ringing(const impact::Impact& impact, std::vector<impact::Body> before, std::vector<StruckBody>& struck,
                              double touch_s, double scale, double blow_j, double most_j);
+  static void add_modal_forces(std::span<const Contact> contacts, std::span<const impact::Contact> springs,
+                               std::span<const impact::Pulse> pulses, double touch_s, std::vector<StruckBody>& struck);
   static void add_forces(const StepView& step, const Contact& contact, double touch_s, std::size_t index,
                          std::span<const impact::Pulse> pulses, double scale, std::vector<events::Event>& events);
 
