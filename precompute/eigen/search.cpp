@@ -262,11 +262,15 @@ BandCounts Search::continue_from(const Modes& known) {
   counts_ = &counts;
   for (const Count& count : known.proof.counts)
     counter_.restore({body_.scaling.to_scaled(std::pow(2 * std::numbers::pi * count.freq_hz, 2)), count.below});
-  const Inertia above = count_below_high(get_band_counter().count_below, body_.asked.high);
-  counts.limits = {body_.scaling.to_scaled(std::pow(2 * std::numbers::pi * known.proof.counts.front().freq_hz, 2)), body_.asked.high};
-  counts.band = {counts.limits.low, known.count_below_low, above.lambda, above.below};
-  counts.limits.low = std::max(counts.limits.low, body_.asked.low);
-  counts.count_below_low = known.count_below_low;
+  const std::vector<Inertia> before = sort_counts(counter_.counts());
+  const auto take = get_band_counter().count_below;
+  const Inertia above = before.back().lambda < body_.asked.high ? count_below_high(take, body_.asked.high) : before.back();
+  Inertia below = before.front();
+  if (below.lambda > body_.asked.low)  // rounding may move the count up
+    if (const Inertia lower = count_below_low(take, body_.asked.low); lower.lambda < below.lambda) below = lower;
+  counts.limits = {std::max(below.lambda, body_.asked.low), body_.asked.high};
+  counts.band = {below.lambda, below.below, above.lambda, above.below};
+  counts.count_below_low = below.below;
   counts.mechanism_count = known.mechanism_count;
   counts.band_count = counts.band.count();
   searched_to_ = above.lambda;

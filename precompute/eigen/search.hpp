@@ -43,8 +43,8 @@ class Search {
   /// Continues until every count agrees with the modes found: repeats counts on a mode elsewhere, and searches gaps between two counts once
   /// more. Moves counts at the ends towards the band if a mode lies between; `counts` is updated. Throws SolveError if a gap remains.
   void complete(BandCounts& counts);
-  /// In place of run(): takes over the modes and counts of a band that ends lower, and counts at the end of this one. complete() then
-  /// searches the modes between.
+  /// In place of run(): takes over the modes and counts of a narrower band, and counts at the ends of this one that lie outside it.
+  /// complete() then searches the modes between.
   BandCounts continue_from(const Modes& known);
 
   const std::vector<Inertia>& counts() const { return counter_.counts(); }

@@ -91,7 +91,7 @@ struct Options {
   /// Frequency range [Hz] in which our L D L^T rejects every shift, as if a pivot vanished. For tests and benchmarks of the fallback to
   /// MUMPS: where a pivot really vanishes depends on rounding. Empty: none.
   std::optional<std::array<double, 2>> refused_shifts_hz;
-  /// All modes of a band of the same problem that ends lower, with shapes: they are kept, and the modes above are searched. Null: none.
+  /// All modes of a narrower band of the same problem, with shapes: they are kept, and the modes around them are searched. Null: none.
   const Modes* known = nullptr;
   int max_steps = 0;                              // blocks of a Krylov run; 0: by the size of its basis. For tests of missing modes
   std::function<void(const Progress&)> progress;  // may be empty

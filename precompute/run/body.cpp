@@ -17,6 +17,7 @@
 #include "precompute/run/meshing.hpp"
 #include "precompute/run/stages.hpp"
 #include "runtime/bank/select.hpp"
+#include "runtime/base/sort_order.hpp"
 
 namespace carillon::run {
 namespace {
@@ -208,11 +209,19 @@ std::optional<std::int64_t> find_computed_count(const job::JobSpec& job) {
   return static_cast<std::int64_t>(error_bars::find_computed_count(static_cast<std::size_t>(*job.max_modes)));
 }
 
+std::int64_t count_below_band(const job::JobSpec& job, const error_bars::Corrections& corrections) {
+  return std::ranges::count_if(
+      corrections.lambda, [&](double lambda) { return !bank::is_above_begin(std::sqrt(lambda) / (2 * std::numbers::pi), job.band_hz[0]); });
+}
+
 std::vector<std::size_t> find_bank_modes(const job::JobSpec& job, const error_bars::Corrections& corrections) {
-  std::vector<std::size_t> modes =
-      error_bars::find_lowest(corrections, static_cast<std::size_t>(job.max_modes.value_or(std::numeric_limits<int>::max())));
-  std::erase_if(
-      modes, [&](std::size_t m) { return !bank::is_below_end(std::sqrt(corrections.lambda[m]) / (2 * std::numbers::pi), job.band_hz[1]); });
+  std::vector<std::size_t> modes = base::find_sort_order(corrections.lambda);
+  std::erase_if(modes, [&](std::size_t m) {
+    const double hz = std::sqrt(corrections.lambda[m]) / (2 * std::numbers::pi);
+    return !bank::is_above_begin(hz, job.band_hz[0]) || !bank::is_below_end(hz, job.band_hz[1]);
+  });
+  if (job.max_modes) modes.resize(std::min(modes.size(), static_cast<std::size_t>(*job.max_modes)));
+  std::ranges::sort(modes);
   return modes;
 }
 
@@ -228,7 +237,7 @@ std::int64_t find_air_nodes(const job::JobSpec& job, std::int64_t surface_nodes)
 /// Sets what the job requests: modes, air, coupled modes.
 void set_demand(const job::JobSpec& job, const Setting& setting, cost::ProblemSize& size) {
   size.modes = find_computed_count(job);
-  size.counts_low_end = !eigen::can_assume_low_end(make_options(job, setting));
+  size.counts_low_end = !eigen::can_assume_low_end(make_options(job, setting, find_range(job, setting)));
   size.air_nodes = find_air_nodes(job, size.surface_nodes);
   if (job.nonlinear) size.coupled_modes = job.nonlinear->modes;
 }

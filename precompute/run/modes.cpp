@@ -14,8 +14,8 @@
 namespace carillon::run {
 namespace {
 
-// The band is one of corrected frequencies, so the mesh is solved further, by the usual correction near the end of a band. Where it is
-// larger, find_more_modes() takes two more factorisations.
+// The band is one of corrected frequencies, so the mesh is solved beyond both ends, by the usual correction near the end of a band. Where
+// it is larger, find_more_modes() takes two more factorisations.
 constexpr double kUsualCents = 25.0, kUsualCentsT4 = 150.0;
 constexpr double kEmptyWidening = 1.5;  // of a band without modes
 
@@ -39,13 +39,13 @@ class ProgressLines {
   std::int64_t tenth_ = 0;
 };
 
-eigen::Modes solve(Run& run, const eigen::Problem& problem, eigen::Options options) {
+eigen::Modes solve(Run& run, const eigen::Problem& problem, eigen::Options options, bool is_first) {
   options.memory_limit_bytes = run.options.get_memory_limit_bytes();
-  if (run.checkpoint && options.known == nullptr) options.checkpoint = &run.checkpoint->get();
+  if (run.checkpoint && is_first) options.checkpoint = &run.checkpoint->get();
   options.progress = ProgressLines(run);
   run.log.begin("modes", fmt::format("{:g} Hz to {:g} Hz", options.low_hz, options.high_hz));
   eigen::Modes modes = eigen::solve_modes(problem, options);
-  if (modes.lambda.empty() && options.known == nullptr) {  // on a coarse mesh the first one may be above the band
+  if (modes.lambda.empty() && is_first) {  // on a coarse mesh the first one may be above the band
     options.high_hz *= kEmptyWidening;
     modes = eigen::solve_modes(problem, options);
   }
@@ -69,9 +69,9 @@ std::string list_changes(const Run& run) {
 }
 
 /// A failure with solver options of the user is attributed to them.
-eigen::Modes solve_named(Run& run, const Body& body, const eigen::Problem& problem, const eigen::Options& options) {
+eigen::Modes solve_named(Run& run, const Body& body, const eigen::Problem& problem, const eigen::Options& options, bool is_first) {
   const std::string changes = list_changes(run);
-  const auto step = [&] { return solve(run, problem, options); };
+  const auto step = [&] { return solve(run, problem, options, is_first); };
   if (changes.empty()) return name_errors(body.source, run, step);
   try {
     return step();
@@ -86,8 +86,8 @@ double calc_diagonal(const mesh::CheckReport& check) {
 }
 
 /// Often the mesh is in millimetres.
-void warn_of_low_modes(Run& run, const Body& body, const eigen::Modes& modes) {
-  const std::int64_t below = modes.count_below_low - modes.rigid_count - modes.mechanism_count;
+void warn_of_low_modes(Run& run, const Body& body, const eigen::Modes& modes, const error_bars::Corrections& corrected) {
+  const std::int64_t below = modes.count_below_low - modes.rigid_count - modes.mechanism_count + count_below_band(run.job, corrected);
   if (below <= 0 || find_low_hz(run.job, modes) > run.job.band_hz[0]) return;
   run.log.warn(
       fmt::format("the fundamental is out of the band: {} mode{} below the band, which begins at {:g} Hz; the body measures {:.3g} m "
@@ -95,8 +95,10 @@ void warn_of_low_modes(Run& run, const Body& body, const eigen::Modes& modes) {
                   below, below == 1 ? " lies" : "s lie", run.job.band_hz[0], calc_diagonal(body.check), describe_scale_key(run.job)));
 }
 
-void warn_of_band(Run& run, const Body& body, const eigen::Modes& modes) {
-  warn_of_low_modes(run, body, modes);
+}  // namespace
+
+void warn_of_band(Run& run, const Body& body, const eigen::Modes& modes, const error_bars::Corrections& corrected) {
+  warn_of_low_modes(run, body, modes, corrected);
   if (const double low_hz = find_low_hz(run.job, modes); low_hz > run.job.band_hz[0]) {
     run.log.warn(fmt::format("the band begins at {:.3g} Hz: {} elastic modes below it cannot be resolved in double precision on this mesh",
                              low_hz, modes.count_below_low - modes.rigid_count));
@@ -107,6 +109,8 @@ void warn_of_band(Run& run, const Body& body, const eigen::Modes& modes) {
                     modes.mechanism_count));
   }
 }
+
+namespace {
 
 eigen::Factorisation to_eigen(job::Factorisation factorisation) {
   switch (factorisation) {
@@ -138,12 +142,17 @@ double find_low_hz(const job::JobSpec& job, const eigen::Modes& modes) {
   return modes.proof.counts.empty() ? job.band_hz[0] : std::max(job.band_hz[0], modes.proof.counts.front().freq_hz);
 }
 
-eigen::Options make_options(const job::JobSpec& job, const Setting& setting) {
+Range find_range(const job::JobSpec& job, const Setting& setting) {
+  const double beyond = std::exp2((setting.element == job::Element::T10 ? kUsualCents : kUsualCentsT4) / 1200);
+  // The lowest modes are counted from the lower end.
+  return {job.max_modes ? job.band_hz[0] : job.band_hz[0] / beyond, job.band_hz[1] * beyond, find_computed_count(job)};
+}
+
+eigen::Options make_options(const job::JobSpec& job, const Setting& setting, const Range& range) {
   eigen::Options options;
-  options.low_hz = job.band_hz[0];
-  const bool is_t10 = setting.element == job::Element::T10;
-  options.high_hz = job.band_hz[1] * std::exp2((is_t10 ? kUsualCents : kUsualCentsT4) / 1200);
-  options.max_modes = find_computed_count(job);
+  options.low_hz = range.low_hz;
+  options.high_hz = range.high_hz;
+  options.max_modes = range.max_modes;
   options.expected_hz = setting.expected_hz;
   options.tolerance = setting.tolerance;
   options.factorisation = to_eigen(job.factorisation);
@@ -165,17 +174,14 @@ eigen::NodeLayout make_layout(Body& body) {
 }
 
 eigen::Modes find_modes(Run& run, const Setting& setting, const Body& body, const eigen::Problem& problem) {
-  eigen::Modes modes = solve_named(run, body, problem, make_options(run.job, setting));
-  warn_of_band(run, body, modes);
-  return modes;
+  return solve_named(run, body, problem, make_options(run.job, setting, find_range(run.job, setting)), true);
 }
 
-eigen::Modes find_more_modes(Run& run, const Setting& setting, const Body& body, const eigen::Problem& problem, double high_hz,
+eigen::Modes find_more_modes(Run& run, const Setting& setting, const Body& body, const eigen::Problem& problem, const Range& range,
                              const eigen::Modes& known) {
-  eigen::Options options = make_options(run.job, setting);
-  options.high_hz = high_hz;
-  options.known = &known;
-  return solve_named(run, body, problem, options);
+  eigen::Options options = make_options(run.job, setting, range);
+  if (!range.max_modes) options.known = &known;
+  return solve_named(run, body, problem, options, false);
 }
 
 }  // namespace carillon::run

@@ -174,15 +174,18 @@ bank::Bank make_bank(const job::JobSpec& job, Solution& found, io::SurfaceModes&
   bank.supports = make_supports(job, solved.errors.supports);
   bank.proof = make_proof(modes);
   bank.counts = {body.pieces.nodes, body.pieces.tets, body.pieces.components, modes.rigid_count};
-  bank.band_hz = {find_low_hz(job, modes), job.band_hz[1]};
   const error_bars::Corrections& corrected = solved.errors.bars.corrected;
+  const double low_hz = find_low_hz(job, modes);
   bank.complete = modes.band_count == static_cast<std::int64_t>(modes.lambda.size()) &&
-                  (corrected.lambda.empty() || std::sqrt(corrected.stated_above) >= 2 * std::numbers::pi * job.band_hz[1]);
+                  (corrected.lambda.empty() || (std::sqrt(corrected.stated_above) >= 2 * std::numbers::pi * job.band_hz[1] &&
+                                                std::sqrt(corrected.stated_below) <= 2 * std::numbers::pi * low_hz));
   bank.element = job::to_text(found.setting.element);
   bank.mass = job::to_text(job.mass);
   if (!derivatives.parameters.empty())
     bank.sensitivities = make_sensitivities(solved.properties.materials.list.front(), body, solved.errors.bars, bank, derivatives);
+  bank.band_hz = job.band_hz;
   bank::keep_band(bank);
+  bank.band_hz[0] = low_hz;
   if (job.max_modes) bank::keep_lowest(bank, static_cast<std::size_t>(*job.max_modes));
   return bank;
 }
@@ -304,31 +307,35 @@ std::string list_numbers(const std::vector<std::size_t>& numbers) {
 
 /// Modes of the bank and modes left out that may lie on the other side of an end of the band, and where modes of the body may be missing;
 /// empty: none.
-std::string describe_end(const job::JobSpec& job, const bank::Bank& bank, const error_bars::Corrections& corrected) {
+std::string describe_ends(const job::JobSpec& job, const bank::Bank& bank, const error_bars::Corrections& corrected) {
   if (corrected.lambda.empty()) return {};
   const auto to_hz = [](double lambda) { return std::sqrt(lambda) / (2 * std::numbers::pi); };
+  const auto is_near = [](double hz, double end_hz, double cents) { return std::abs(1200 * std::log2(hz / end_hz)) <= cents; };
   std::vector<std::string> parts;
   for (const double end_hz : job.band_hz) {
-    const auto is_near = [&](double hz, double cents) { return std::abs(1200 * std::log2(hz / end_hz)) <= cents; };
+    const bool is_low = end_hz == job.band_hz[0];
     std::vector<std::size_t> near;
     for (std::size_t m = 0; m < bank.mode_count(); ++m)
-      if (is_near(bank.corrected.freq_hz[m], bank.corrected.error_cents[m])) near.push_back(m + 1);
+      if (is_near(bank.corrected.freq_hz[m], end_hz, bank.corrected.error_cents[m])) near.push_back(m + 1);
     if (!near.empty())
       parts.push_back(fmt::format("mode{} {} may lie on either side of the band's end at {:g} Hz, within {} error bar{}",
                                   near.size() == 1 ? "" : "s", list_numbers(near), end_hz, near.size() == 1 ? "its" : "their",
                                   near.size() == 1 ? "" : "s"));
+    if (!is_low && !bank.complete && job.max_modes) continue;
+    std::vector<double> left_hz;
+    for (std::size_t m = 0; m < corrected.lambda.size(); ++m)
+      if (const double hz = to_hz(corrected.lambda[m]);
+          (is_low ? !bank::is_above_begin(hz, end_hz) : !bank::is_below_end(hz, end_hz)) && is_near(hz, end_hz, corrected.cents[m]))
+        left_hz.push_back(hz);
+    if (!left_hz.empty())
+      parts.push_back(fmt::format("{} mode{} left out, {} {:.2f} Hz, may lie {} {:g} Hz", left_hz.size(), left_hz.size() == 1 ? "" : "s",
+                                  is_low ? "up to" : "from", is_low ? std::ranges::max(left_hz) : std::ranges::min(left_hz),
+                                  is_low ? "above" : "below", end_hz));
+    if (const double hz = to_hz(corrected.complete_above); is_low && hz > end_hz)
+      parts.push_back(fmt::format("modes below {:.4g} Hz may be missing", hz));
+    if (const double hz = to_hz(corrected.complete_below); !is_low && hz < end_hz)
+      parts.push_back(fmt::format("modes above {:.4g} Hz may be missing", hz));
   }
-  if (!bank.complete && job.max_modes) return fmt::format("{}", fmt::join(parts, "; "));
-  const double high_hz = job.band_hz[1];
-  std::vector<double> left_hz;
-  for (std::size_t m = 0; m < corrected.lambda.size(); ++m)
-    if (const double hz = to_hz(corrected.lambda[m]); hz > high_hz && 1200 * std::log2(hz / high_hz) <= corrected.cents[m])
-      left_hz.push_back(hz);
-  if (!left_hz.empty())
-    parts.push_back(fmt::format("{} mode{} left out, from {:.2f} Hz on, may lie below it", left_hz.size(), left_hz.size() == 1 ? "" : "s",
-                                *std::ranges::min_element(left_hz)));
-  if (const double complete_hz = to_hz(corrected.complete_below); complete_hz < high_hz)
-    parts.push_back(fmt::format("modes above {:.4g} Hz may be missing", complete_hz));
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 
@@ -339,7 +346,7 @@ RunSummary write_outputs(Run& run, const Solution& found, const AccuracyReport& 
   summary.bank = run.job.bank;
   summary.resolved = job::find_resolved_path(run.job.bank);
   if (run.comm.is_root()) summary.warning = describe_wide_bars(bank, found.setting, run.job.accuracy_cents.has_value());
-  const std::string end = run.comm.is_root() ? describe_end(run.job, bank, found.solved.errors.bars.corrected) : "";
+  const std::string end = run.comm.is_root() ? describe_ends(run.job, bank, found.solved.errors.bars.corrected) : "";
   const fs::path folder = fs::absolute(summary.bank).parent_path();
   const auto make_record = [&](const Measured& measured) {
     base::Json record = describe_run(run, found, measured);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "precompute/eigen/search_checkpoint.hpp"
@@ -9,6 +10,7 @@
 #include "precompute/run/io/fingerprint.hpp"
 #include "precompute/run/io/matrices.hpp"
 #include "precompute/run/stages.hpp"
+#include "runtime/bank/select.hpp"
 
 namespace carillon::run {
 namespace {
@@ -24,24 +26,74 @@ error_bars::ErrorBars calc_bars(const Run& run, const Body& body, const Assemble
 error_bars::Solution describe(const Run& run, const eigen::Modes& modes) {
   const bool is_cut = modes.band_count > static_cast<std::int64_t>(modes.lambda.size());
   const double last_hz = modes.lambda.empty() ? 0.0 : std::sqrt(modes.lambda.back()) / (2 * std::numbers::pi);
-  error_bars::Solution solution{modes.lambda, modes.residual, modes.shapes, find_low_hz(run.job, modes),
+  error_bars::Solution solution{modes.lambda, modes.residual, modes.shapes,
+                                modes.proof.counts.empty() ? run.job.band_hz[0] : modes.proof.counts.front().freq_hz,
                                 is_cut || modes.proof.counts.empty() ? last_hz : modes.proof.counts.back().freq_hz};
   solution.below = std::max<std::int64_t>(0, modes.count_below_low - modes.rigid_count - modes.mechanism_count);
   return solution;
 }
 
-/// Upper end of the mesh's band [Hz] beyond which no corrected frequency lies in the job's, predicted from the modes near its present end;
-/// 0 if it is there already, or the job takes only some of the modes. It includes what error bars reach, unless they are long.
-double find_wider_end(const Run& run, const eigen::Modes& modes, const error_bars::Corrections& corrected) {
-  constexpr double kGrowth = 1.1, kBeyond = 50.0, kMost = 1700.0;  // of corrections towards higher modes; cents: for bars, and in all
-  if (modes.lambda.empty() || modes.band_count > std::ssize(modes.lambda)) return 0.0;
-  const double high_hz = run.job.band_hz[1], solved_hz = modes.proof.counts.back().freq_hz;
-  const auto calc_cents = [&](double lambda) { return 1200 * std::log2(solved_hz / (std::sqrt(lambda) / (2 * std::numbers::pi))); };
-  const double stated = calc_cents(corrected.stated_above), reach = calc_cents(corrected.complete_below);
-  if (1200 * std::log2(solved_hz / high_hz) >= stated) return 0.0;
-  const double cents = std::min(kGrowth * std::min(reach, stated + kBeyond), kMost);
-  const double end_hz = high_hz * std::exp2(std::ceil(cents) / 1200);  // whole cents: the same on any number of ranks
-  return end_hz > solved_hz ? end_hz : 0.0;
+constexpr double kMostCents = 1700.0;  // that a mesh is solved beyond an end of the band
+
+/// How far the mesh must be solved beyond an end of the band [cents]. stated: until no corrected frequency is in it; reach: until no error
+/// bar is.
+double choose_cents(double stated, double reach) {
+  constexpr double kGrowth = 1.1, kBeyond = 50.0;                                       // of corrections farther out; for bars
+  return std::ceil(std::min(kGrowth * std::min(reach, stated + kBeyond), kMostCents));  // whole cents: the same on any number of ranks
+}
+
+/// Interval in cents from `from_hz` up to lambda.
+double calc_cents(double from_hz, double lambda) { return 1200 * std::log2(std::sqrt(lambda) / (2 * std::numbers::pi) / from_hz); }
+
+/// A list of few modes, or of less than an octave amid the modes, may lack a kind with larger corrections, as the second of two kinds that
+/// begin in turn. It has to show some modes beyond the band, unless the mesh is solved that far. Returns how far it is to be solved
+/// [cents]; 0: far enough.
+double find_unseen_cents(const job::JobSpec& job, const eigen::Modes& modes, const error_bars::Corrections& corrected) {
+  constexpr std::int64_t kShown = 12;
+  constexpr double kLarger = 10.0;  // times the largest correction; torsion of a bar in coarse T10: eight times that of bending
+  const double top_hz = modes.proof.counts.back().freq_hz, held = -calc_cents(top_hz, modes.lambda.front());
+  if (corrected.stated_below > 0.0 ? held >= 1200.0 : std::ssize(modes.lambda) >= kShown) return 0.0;
+  double largest = 0.0;
+  std::int64_t beyond = 0;
+  for (std::size_t m = 0; m < modes.lambda.size(); ++m) {
+    largest = std::max(largest, std::abs(600 * std::log2(corrected.lambda[m] / modes.lambda[m])));
+    beyond += bank::is_below_end(std::sqrt(corrected.lambda[m]) / (2 * std::numbers::pi), job.band_hz[1]) ? 0 : 1;
+  }
+  const double solved = 1200 * std::log2(top_hz / job.band_hz[1]), most = std::min(kLarger * largest, kMostCents);
+  if (beyond >= kShown || solved >= most) return 0.0;
+  const double spacing = held / static_cast<double>(modes.lambda.size());
+  return std::ceil(std::min(std::max(2 * solved, solved + static_cast<double>(kShown - beyond) * spacing), most));
+}
+
+/// Range of the mesh beyond which no corrected frequency lies in the job's band, predicted from the modes near the ends of the present one;
+/// nullopt if the present one is wide enough.
+std::optional<Range> find_wider_range(const Run& run, const Range& range, const eigen::Modes& modes,
+                                      const error_bars::Corrections& corrected) {
+  if (modes.lambda.empty()) return std::nullopt;
+  constexpr double kEdge = 1e-6;  // relative: counts are taken so near the ends
+  const auto [low_hz, high_hz] = run.job.band_hz;
+  Range wider = range;
+  if (modes.band_count == std::ssize(modes.lambda)) {
+    const double top_hz = modes.proof.counts.back().freq_hz, stated = -calc_cents(top_hz, corrected.stated_above);
+    double cents = find_unseen_cents(run.job, modes, corrected);
+    if (1200 * std::log2(top_hz / high_hz) < stated)
+      cents = std::max(cents, choose_cents(stated, -calc_cents(top_hz, corrected.complete_below)));
+    if (const double end_hz = high_hz * std::exp2(cents / 1200); end_hz > top_hz * (1 + kEdge)) wider.high_hz = end_hz;
+  } else if (range.max_modes) {
+    wider.max_modes = std::max(*range.max_modes, *find_computed_count(run.job) + count_below_band(run.job, corrected));
+    const bool is_short = std::ssize(find_bank_modes(run.job, corrected)) < *run.job.max_modes;
+    if (is_short && wider.max_modes == range.max_modes) *wider.max_modes *= 2;
+  }
+  const double bottom_hz = modes.proof.counts.front().freq_hz;
+  if (corrected.stated_below > 0.0 && bottom_hz <= low_hz) {  // rounding may have moved it up
+    const double stated = calc_cents(bottom_hz, corrected.stated_below);
+    if (1200 * std::log2(low_hz / bottom_hz) < stated) {
+      const double end_hz = low_hz / std::exp2(choose_cents(stated, calc_cents(bottom_hz, corrected.complete_above)) / 1200);
+      if (end_hz < bottom_hz * (1 - kEdge)) wider.low_hz = end_hz;
+    }
+  }
+  const bool is_wider = wider.low_hz != range.low_hz || wider.high_hz != range.high_hz || wider.max_modes != range.max_modes;
+  return is_wider ? std::optional(wider) : std::nullopt;
 }
 
 /// Collective. Throws on every rank: SolveError, SystemError, naming the body and the job.
@@ -108,10 +160,13 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   solved.modes = find_modes(run, setting, body, problem);
   save_if_requested(run, solved.modes);
   error_bars::ErrorBars bars = calc_errors(run, body, system, solved.modes);
-  for (double end_hz = 0.0; (end_hz = find_wider_end(run, solved.modes, bars.corrected)) > 0.0;) {
-    solved.modes = find_more_modes(run, setting, body, problem, end_hz, solved.modes);
+  Range range = find_range(run.job, setting);
+  while (const std::optional<Range> wider = find_wider_range(run, range, solved.modes, bars.corrected)) {
+    range = *wider;
+    solved.modes = find_more_modes(run, setting, body, problem, range, solved.modes);
     bars = calc_errors(run, body, system, solved.modes);
   }
+  warn_of_band(run, body, solved.modes, bars.corrected);
   solved.errors = calc_properties(run, body, system, solved.modes, std::move(bars));
   if (find_bank_modes(run.job, solved.errors.bars.corrected).empty()) run.log.warn("no mode in the band: the bank will be silent");
   save_if_requested(run, solved.modes, has_later_stages(run.job));  // later stages may take longer than the modes

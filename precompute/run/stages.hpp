@@ -105,7 +105,10 @@ std::string describe_scale_key(const job::JobSpec& job);
 /// Number of modes to compute: more than `max_modes`, so that the lowest corrected ones are reliable; nullopt: all of the band.
 std::optional<std::int64_t> find_computed_count(const job::JobSpec& job);
 
-/// Modes of the bank, ascending: those whose corrected frequency is not above the job's band, the lowest `max_modes` of them.
+/// Number of modes whose corrected frequency is below the job's band.
+std::int64_t count_below_band(const job::JobSpec& job, const error_bars::Corrections& corrections);
+
+/// Modes of the bank, ascending: those whose corrected frequency is in the job's band, the lowest `max_modes` of them.
 std::vector<std::size_t> find_bank_modes(const job::JobSpec& job, const error_bars::Corrections& corrections);
 
 /// Rank 0.
@@ -124,8 +127,17 @@ Body make_body(Run& run, const Setting& setting);
 /// every rank: InputError, SolveError, SystemError, naming the body or the job's line.
 AssembledSystem assemble_system(Run& run, const Setting& setting, const Body& body);
 
+/// Modes of the mesh to be found.
+struct Range {
+  double low_hz = 0.0, high_hz = 0.0;
+  std::optional<std::int64_t> max_modes;  // the lowest; nullopt: all
+};
+
+/// A little wider than the job's band, for modes whose corrected frequencies are in it.
+Range find_range(const job::JobSpec& job, const Setting& setting);
+
 /// Options of the eigensolver.
-eigen::Options make_options(const job::JobSpec& job, const Setting& setting);
+eigen::Options make_options(const job::JobSpec& job, const Setting& setting, const Range& range);
 
 /// Lower end of the bank's band [Hz]: from the job, or higher if rounding hides lower modes.
 double find_low_hz(const job::JobSpec& job, const eigen::Modes& modes);
@@ -133,14 +145,17 @@ double find_low_hz(const job::JobSpec& job, const eigen::Modes& modes);
 /// Positions and components of the free nodes; moves the elimination order out of the body.
 eigen::NodeLayout make_layout(Body& body);
 
-/// All modes of the job's band and of a little above it, whose corrected frequencies may be in it, with the proof of completeness. Warns of
-/// modes below the band and of mechanisms. Phase "modes". Collective. Throws on every rank: InputError, SolveError, SystemError, naming the
-/// body and the job; eigen::Stopped when a signal requested a checkpoint.
+/// All modes of find_range(), with the proof of completeness. Phase "modes". Collective. Throws on every rank: InputError, SolveError,
+/// SystemError, naming the body and the job; eigen::Stopped when a signal requested a checkpoint.
 eigen::Modes find_modes(Run& run, const Setting& setting, const Body& body, const eigen::Problem& problem);
 
-/// Continues `known`, a result of find_modes(), up to high_hz. Without checkpoints: a run stopped there resumes from `known`.
-eigen::Modes find_more_modes(Run& run, const Setting& setting, const Body& body, const eigen::Problem& problem, double high_hz,
+/// The same of a wider range. Continues `known`, a result of find_modes(), unless the range has only the lowest modes. Without checkpoints:
+/// a run stopped there resumes from `known`.
+eigen::Modes find_more_modes(Run& run, const Setting& setting, const Body& body, const eigen::Problem& problem, const Range& range,
                              const eigen::Modes& known);
+
+/// Warns of modes below the band and of mechanisms.
+void warn_of_band(Run& run, const Body& body, const eigen::Modes& modes, const error_bars::Corrections& corrected);
 
 /// Assembles K and M, finds the modes of the job's band, and estimates their errors. Frees K, M and the elimination order of the body.
 /// Collective. Throws on every rank: InputError, SolveError, SystemError, naming the body and the job; eigen::Stopped when a signal

@@ -65,8 +65,8 @@ void analyse(Run& run, const Setting& setting, Prediction& found) {
       found.notes.push_back(fmt::format("the modes were not counted: a factorisation has {:.2g} operations", estimate.flops));
     return fits && estimate.flops <= kMaxCountFlops;
   };
-  eigen::Options options = make_options(run.job, setting);
-  options.high_hz = run.job.band_hz[1];  // the modes of the bank; the few above it, which are solved too, count for nothing
+  // The modes of the bank; the few around them, which are solved too, count for nothing.
+  const eigen::Options options = make_options(run.job, setting, {run.job.band_hz[0], run.job.band_hz[1], find_computed_count(run.job)});
   found.solve = name_errors(found.body.source, run, [&] {
     return eigen::predict_cost({system.matrices.stiffness, system.matrices.mass, make_layout(found.body)}, options, may_count);
   });

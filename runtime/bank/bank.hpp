@@ -79,6 +79,8 @@ struct Proof {
   std::vector<std::int64_t> cluster_count;
   std::string method;              // description
   double complete_below_hz = 0.0;  // all modes of the mesh from the first cut to here are in the bank; 0: up to the last one
+  // Frequencies on the mesh, ascending, of the modes counted between the cuts whose corrected frequencies are below the band.
+  std::vector<double> below_band_hz;
 };
 
 /// Forces of the modes on the supports. S supports: patches of fixed nodes.
@@ -176,7 +178,7 @@ struct Bank {
   std::optional<Proof> proof;  // missing in version 1.0
   Counts counts;
   std::array<double, 2> band_hz{20.0, 20000.0};
-  bool complete = true;  // all modes of the band are present, by corrected frequencies at its upper end; false: the lowest, or unsure
+  bool complete = true;  // all modes of the band are present, by corrected frequencies; false: the lowest, or unsure
   // "T4", "T10"; "analytic": string, beam, membrane, plate or table (since 1.4); "imported": other program, accuracy unknown (since 1.8)
   std::string element;
   std::string mass;        // "consistent" or "lumped"

@@ -34,6 +34,11 @@ std::int64_t count_modes_below(const Bank& bank, double cut_hz) {
   return std::lower_bound(lambda.begin(), lambda.end(), calc_lambda(cut_hz)) - lambda.begin();
 }
 
+/// Number of modes of the mesh that were left out below the band, and lie below the cut.
+std::int64_t count_left_below(const Proof& proof, double cut_hz) {
+  return std::lower_bound(proof.below_band_hz.begin(), proof.below_band_hz.end(), cut_hz) - proof.below_band_hz.begin();
+}
+
 /// Relative uncertainty of the eigenvalue: its error bar, else its residual.
 double calc_uncertainty(const Bank& bank, std::size_t mode) {
   if (bank.algebraic_error_cents.empty()) return bank.residual[mode];
@@ -81,11 +86,12 @@ Check check_cuts(const Bank& bank, const Proof& proof) {
 /// Modes of the bank against the counts, in each interval between cuts.
 Check check_completeness(const Bank& bank, const Proof& proof) {
   Faults faults;
-  const auto modes = static_cast<std::int64_t>(bank.mode_count());
+  const auto modes = static_cast<std::int64_t>(bank.mode_count()), left_out = std::ssize(proof.below_band_hz);
   const std::int64_t counted = proof.below.back() - proof.below.front();
   for (std::size_t i = 0; i + 1 < proof.cut_hz.size(); ++i) {
     const std::int64_t wanted = proof.below[i + 1] - proof.below[i];
-    const std::int64_t held = count_modes_below(bank, proof.cut_hz[i + 1]) - count_modes_below(bank, proof.cut_hz[i]);
+    const std::int64_t left = count_left_below(proof, proof.cut_hz[i + 1]) - count_left_below(proof, proof.cut_hz[i]);
+    const std::int64_t held = count_modes_below(bank, proof.cut_hz[i + 1]) - count_modes_below(bank, proof.cut_hz[i]) + left;
     // The lowest modes are kept, or those of the band, by their corrected frequencies: only past the end of the list may counts exceed it.
     const bool is_cut_here = proof.complete_below_hz > 0.0 ? proof.cut_hz[i + 1] > proof.complete_below_hz
                                                            : !bank.complete && count_modes_below(bank, proof.cut_hz[i + 1]) == modes;
@@ -94,18 +100,22 @@ Check check_completeness(const Bank& bank, const Proof& proof) {
                proof.cut_hz[i + 1], held);
   }
   const bool is_whole = bank.complete && proof.complete_below_hz == 0.0;
-  const bool adds_up = is_whole ? proof.found == counted && modes == counted : proof.found >= modes && proof.found <= counted;
+  const std::int64_t known = modes + left_out;
+  const bool adds_up = is_whole ? proof.found == counted && known == counted : proof.found >= known && proof.found <= counted;
   if (!adds_up) {
     faults.add("{} modes were found, {} are stored, and the counts give {} - {} = {}", proof.found, modes, proof.below.back(),
                proof.below.front(), counted);
   }
+  const bool is_corrected = modes == 0 || !bank.corrected.is_empty();
+  if (left_out > 0 && !is_corrected) faults.add("below_band_hz has {} modes, and none has a corrected frequency", left_out);
+  if (!std::ranges::is_sorted(proof.below_band_hz)) faults.add("below_band_hz does not ascend");
   // A complete bank without modes of the mesh lacks those whose corrected frequencies are above the band.
-  const bool may_lack = !bank.complete || (!bank.corrected.is_empty() && proof.found == counted && proof.found > modes);
+  const bool may_lack = !bank.complete || (is_corrected && proof.found == counted && proof.found > known);
   if (may_lack ? !(proof.complete_below_hz >= 0.0) : proof.complete_below_hz != 0.0)
     faults.add("complete_below_hz is {:.6g}, of a bank that is {}", proof.complete_below_hz, bank.complete ? "complete" : "cut");
   return {"complete",
-          is_whole ? fmt::format("{} - {} = {} modes, all of them found; every interval between cuts agrees", proof.below.back(),
-                                 proof.below.front(), counted)
+          is_whole && left_out == 0 ? fmt::format("{} - {} = {} modes, all of them found; every interval between cuts agrees",
+                                                  proof.below.back(), proof.below.front(), counted)
           : bank.complete
               ? fmt::format("{} - {} = {} modes of the mesh, {} of them in the band once corrected; every interval between cuts agrees",
                             proof.below.back(), proof.below.front(), counted, modes)
@@ -255,13 +265,15 @@ std::string describe_completeness(const Bank& bank) {
   const Proof& proof = *bank.proof;
   const std::int64_t counted = proof.below.back() - proof.below.front();
   std::string text = bank.complete ? fmt::format("{} modes in {:g} .. {:g} Hz and no more", modes, low, high)
-                     : static_cast<std::int64_t>(modes) == counted
+                     : std::ssize(bank.eigenvalue_rad2_s2) + std::ssize(proof.below_band_hz) == counted
                          ? fmt::format("{} modes in {:g} .. {:g} Hz, perhaps not all", modes, low, high)
                          : fmt::format("the lowest {} of {} modes in {:g} .. {:g} Hz", modes, counted, low, high);
   std::int64_t rigid = 0;
   for (const std::int64_t count : proof.rigid_per_component) rigid += count;
   text += fmt::format(": {} below {:.6g} Hz and {} below {:.6g} Hz {}, {} rigid", proof.below.front(), proof.cut_hz.front(),
                       proof.below.back(), proof.cut_hz.back(), bank.element == "analytic" ? "by enumeration" : "by inertia", rigid);
+  if (const std::size_t left = proof.below_band_hz.size(); left > 0)
+    text += fmt::format(", {} of the mesh below the band once corrected", left);
   return text;
 }
 

@@ -157,6 +157,7 @@ Check check_numbers(const Bank& bank) {
   if (bank.proof) {
     look_all("proof/cut_hz", bank.proof->cut_hz);
     look_all("proof/margin", bank.proof->margin);
+    look_all("proof/below_band_hz", bank.proof->below_band_hz);
     look("proof/complete_below_hz", &bank.proof->complete_below_hz, 1);
     look("proof/orthonormality", &bank.proof->orthonormality, 1);
     look("proof/backward_error", &bank.proof->backward_error, 1);
@@ -183,7 +184,7 @@ Check check_band(const Bank& bank) {
   if (!(low >= 0.0 && low < high)) faults.add("band_hz is [{:.6g}, {:.6g}], not an ascending pair of frequencies", low, high);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double freq = bank.freq_hz(i);
-    // Selected by the corrected frequency, if there is one; before 1.9 by that of the mesh.
+    // Selected by the corrected frequency, if there is one; before 1.9 by that of the mesh, as at a lower end that rounding moved.
     const double other = bank.corrected.freq_hz.size() == bank.mode_count() ? bank.corrected.freq_hz[i] : freq;
     if (!(std::max(freq, other) >= low * (1.0 - kLawTolerance) && std::min(freq, other) <= high * (1.0 + kLawTolerance))) {
       faults.add("mode {} at {:.6g} Hz lies outside the band of {:.6g} to {:.6g} Hz", i, freq, low, high);

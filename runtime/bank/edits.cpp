@@ -199,6 +199,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
   for (double& freq : edited.band_hz) freq *= freq_scale;
   if (edited.proof) {
     for (double& cut : edited.proof->cut_hz) cut *= freq_scale;
+    for (double& below : edited.proof->below_band_hz) below *= freq_scale;
     edited.proof->complete_below_hz *= freq_scale;
   }
   edited.provenance = fmt::format(R"({{"edits": {{"density_scale": {}, "stiffness_scale": {}, "size_scale": {})", s, k, g);

@@ -3,6 +3,8 @@
 #include <bit>
 #include <charconv>
 
+#include "runtime/bank/select.hpp"
+
 namespace carillon::bank {
 
 // Arrays are copied unchanged between file and memory.
@@ -192,6 +194,9 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
         proof.cluster_first.data()},
        {"proof/cluster_count", "<i8", find_shape(proof.cluster_count), "1", "modes of the group", proof.cluster_count.data()},
        {"proof/method", text_type(form.proof_method), {}, "1", "how it was counted", form.proof_method.data()}});
+  if (!proof.below_band_hz.empty())
+    fields.push_back({"proof/below_band_hz", "<f8", find_shape(proof.below_band_hz), "Hz",
+                      "modes of the mesh whose corrected frequencies are below the band", proof.below_band_hz.data()});
   if (form.has_complete_below)
     fields.push_back({"proof/complete_below_hz",
                       "<f8",
@@ -302,9 +307,10 @@ FileForm make_file_form(const Bank& bank) {
 }
 
 std::array<int, 2> find_version(const Bank& bank, bool is_packed) {
-  const bool is_cut_across = bank.complete && bank.proof && bank.proof->complete_below_hz > 0.0;
-  const bool has_above = !bank.corrected.is_empty() && bank.mode_count() > 0 && bank.freq_hz(bank.mode_count() - 1) > bank.band_hz[1];
-  if (!bank.sensitivities.is_empty() || is_cut_across || has_above) return is_packed ? std::array{2, 5} : std::array{1, 9};
+  const bool is_cut_across = bank.proof && (!bank.proof->below_band_hz.empty() || (bank.complete && bank.proof->complete_below_hz > 0.0));
+  const bool has_outside = !bank.corrected.is_empty() && bank.mode_count() > 0 &&
+                           (!is_above_begin(bank.freq_hz(0), bank.band_hz[0]) || bank.freq_hz(bank.mode_count() - 1) > bank.band_hz[1]);
+  if (!bank.sensitivities.is_empty() || is_cut_across || has_outside) return is_packed ? std::array{2, 5} : std::array{1, 9};
   if (bank.element == "imported" || !bank.facet_error_cents.empty()) return is_packed ? std::array{2, 4} : std::array{1, 8};
   if (!bank.quartic.is_empty()) return is_packed ? std::array{2, 3} : std::array{1, 7};
   const bool is_mixed = !bank.multipoles.mixing.is_empty();

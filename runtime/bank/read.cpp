@@ -291,6 +291,7 @@ class Allocator {
     make_list("proof/cluster_first", "<i8", proof.cluster_first);
     make_list("proof/cluster_count", "<i8", proof.cluster_count);
     make_text("proof/method", form_.proof_method);
+    if (has("proof/below_band_hz")) make_list("proof/below_band_hz", "<f8", proof.below_band_hz);
     form_.has_complete_below = has("proof/complete_below_hz");
   }
 

@@ -255,6 +255,7 @@ base::Json make_proof(const Proof& proof) {
   value.set("orthonormality", proof.orthonormality).set("backward_error", proof.backward_error);
   value.set("cluster_first", make_counts(proof.cluster_first)).set("cluster_count", make_counts(proof.cluster_count));
   value.set("method", proof.method);
+  if (!proof.below_band_hz.empty()) value["below_band_hz"] = make_list(proof.below_band_hz);
   return value;
 }
 

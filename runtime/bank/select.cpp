@@ -90,8 +90,25 @@ void select_modes(Bank& bank, const std::vector<std::size_t>& chosen) {
   select_values(bank.supports.energy, chosen, bank.supports.count());
 }
 
-void keep_band(Bank& bank) {
-  if (bank.corrected.is_empty()) return;
+namespace {
+
+void keep(Bank& bank, const std::vector<std::size_t>& kept) {
+  select_modes(bank, kept);
+  if (bank.proof) renumber_groups(*bank.proof, kept);
+}
+
+void drop_below_band(Bank& bank) {
+  std::vector<std::size_t> kept;
+  for (std::size_t m = 0; m < bank.mode_count(); ++m) {
+    if (is_above_begin(bank.corrected.freq_hz[m], bank.band_hz[0]))
+      kept.push_back(m);
+    else if (bank.proof)
+      bank.proof->below_band_hz.push_back(bank.freq_hz(m));
+  }
+  if (kept.size() < bank.mode_count()) keep(bank, kept);
+}
+
+void drop_above_band(Bank& bank) {
   std::vector<std::size_t> kept;
   for (std::size_t m = 0; m < bank.mode_count(); ++m)
     if (is_below_end(bank.corrected.freq_hz[m], bank.band_hz[1])) kept.push_back(m);
@@ -103,8 +120,15 @@ void keep_band(Bank& bank) {
     end_proof(bank, end_hz, first_gone, *bank.proof);
   else if (bank.proof)
     bank.proof->complete_below_hz = bank.freq_hz(first_gone);
-  select_modes(bank, kept);
-  if (bank.proof) renumber_groups(*bank.proof, kept);
+  keep(bank, kept);
+}
+
+}  // namespace
+
+void keep_band(Bank& bank) {
+  if (bank.corrected.is_empty()) return;
+  drop_above_band(bank);
+  drop_below_band(bank);
 }
 
 void keep_lowest(Bank& bank, std::size_t count) {
@@ -115,10 +139,9 @@ void keep_lowest(Bank& bank, std::size_t count) {
   const bool is_head = first_gone == count;  // also the lowest of the mesh
   kept.resize(count);
   std::sort(kept.begin(), kept.end());
-  select_modes(bank, kept);
+  keep(bank, kept);
   bank.complete = false;
   if (!bank.proof) return;
-  renumber_groups(*bank.proof, kept);
   if (double& below_hz = bank.proof->complete_below_hz; below_hz > 0.0)
     below_hz = std::min(below_hz, complete_below_hz);
   else if (!is_head)

@@ -104,6 +104,7 @@ base::Json make_proof(const bank::Proof& proof) {
     json["below"].add(proof.below[i]);
     json["margin"].add(to_json(proof.margin[i]));
   }
+  json.set("below_band_hz", make_list(proof.below_band_hz));
   json.set("orthonormality", to_json(proof.orthonormality)).set("backward_error", to_json(proof.backward_error));
   json.set("rigid", make_list(proof.rigid_per_component)).set("clusters", proof.cluster_first.size()).set("method", proof.method);
   return json;

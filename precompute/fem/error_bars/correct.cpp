@@ -149,6 +149,8 @@ Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, co
   const double most = level.kind == Kind::kT4 ? 1 - kStiffT4 * (0.94 - kStiffT4 * (0.62 - 0.5 * kStiffT4)) : 1 / (1 + kStiffT10);
   const double top = std::max(level.lambda.back(), 4 * std::numbers::pi * std::numbers::pi * unlisted.high_hz * unlisted.high_hz);
   corrections.stated_above = std::max(find_lowest_unlisted(level.lambda, own.stated, unlisted), most * top);
+  corrections.stated_below = find_highest_unlisted(level.lambda, own.stated, unlisted);
+  corrections.complete_above = find_highest_unlisted(level.lambda, own.above, unlisted);
   if (level.kind == Kind::kT4)  // where bending is octaves too high, the k-th of the list need not be the k-th of the body
     for (std::size_t m = 0; m < parts.size(); ++m)
       if (bank::is_reliable(corrections.correction[m]) && corrections.cents[m] > kOverlaid * (own.high[m] - own.stated[m]))
@@ -334,13 +336,6 @@ bool is_too_short(const Level& level) {
 std::size_t find_computed_count(std::size_t wanted) {
   constexpr std::size_t kLeast = 12, kMost = 20;  // additional modes of a short list
   return std::max(wanted + std::min((wanted + 4) / 5, kMost), kLeast);
-}
-
-std::vector<std::size_t> find_lowest(const Corrections& corrections, std::size_t wanted) {
-  std::vector<std::size_t> lowest = base::find_sort_order(corrections.lambda);
-  lowest.resize(std::min(lowest.size(), wanted));
-  std::sort(lowest.begin(), lowest.end());
-  return lowest;
 }
 
 }  // namespace carillon::error_bars

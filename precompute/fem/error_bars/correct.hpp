@@ -40,7 +40,9 @@ struct Corrections {
   std::vector<double> own_cents;  // (m) bar of the mode itself, known by its shape: no longer where others may take its place in the list
   std::vector<double> facet_cents;  // (m) as ErrorBars::facet_cents, around `lambda`; empty: no facets in doubt
   double complete_below = 0.0;      // [rad^2/s^2] modes of the body that are not listed lie above
-  double stated_above = 0.0;        // [rad^2/s^2] stated values of modes of the mesh that are not listed lie above
+  double stated_above = 0.0;        // [rad^2/s^2] stated values of modes of the mesh that are not listed lie above,
+  double stated_below = 0.0;        // or below, as those of the body below
+  double complete_above = 0.0;      // [rad^2/s^2]; 0: no modes lie below the list
   // (m) one mesh: half the mesh's bar (T4: 0.4 of it); two meshes: a quarter (most T10: an eighth, see docs/error-bars.md), up to twice
   // that where T10 nearly agree; rough estimates: the mesh's own interval; uncorrected modes: the mesh's bar; disputed modes: the distance
   // of the two meshes
@@ -64,8 +66,5 @@ bool is_too_short(const Level& level);
 
 /// Number of modes to compute for `wanted` reliable ones: the order of the last modes and the bars of short lists need a few more.
 std::size_t find_computed_count(std::size_t wanted);
-
-/// Modes with the `wanted` lowest corrected frequencies, ascending numbers; all if there are fewer.
-std::vector<std::size_t> find_lowest(const Corrections& corrections, std::size_t wanted);
 
 }  // namespace carillon::error_bars

@@ -26,6 +26,10 @@ struct Unlisted {
 /// the mesh: OwnIntervals::low gives a bound of the true values, OwnIntervals::stated the stated ones. Other arguments as below. Pure.
 double find_lowest_unlisted(std::span<const double> lambda, std::span<const double> moved, const Unlisted& unlisted);
 
+/// Greatest lambda [rad^2/s^2] of unlisted modes below the list if they move up as those near its beginning do; 0 without any. moved: as
+/// above: OwnIntervals::above gives a bound of the true values. Pure.
+double find_highest_unlisted(std::span<const double> lambda, std::span<const double> moved, const Unlisted& unlisted);
+
 /// Bars [cents] of the stated frequencies: the k-th lowest of them is within its bar of the k-th true one, k counting unlisted modes below
 /// too. lambda: (m) of the mesh, ascending, m > 0. Returns (m), in the order of lambda. Pure.
 std::vector<double> widen_for_order(std::span<const double> lambda, const OwnIntervals& own, const Unlisted& unlisted);

@@ -131,10 +131,13 @@ function makeProof() {
       : bank.version.join('.') === '1.0' ? 'banks of version 1.0 carry none; the band may hold more modes.'
         : 'the bank has none; the band may hold more modes.');
   }
+  const count = (list, i) => list.filter((freq) => freq >= proof.cut_hz[i - 1] && freq < proof.cut_hz[i]).length;
+  const countHere = (i) => {
+    const here = String(count(modes.freq_hz, i)), left = count(proof.below_band_hz, i);
+    return left > 0 ? `${here} + ${left} below the band once corrected` : here;
+  };
   const rows = proof.cut_hz.slice(0, kMaxModeRows).map((cut, i) => [plain(cut), String(proof.below[i]),
-    i > 0 ? String(proof.below[i] - proof.below[i - 1]) : '',
-    i > 0 ? String(modes.freq_hz.filter((freq) => freq >= proof.cut_hz[i - 1] && freq < cut).length) : '',
-      digits(proof.margin[i] ?? NaN, 2)]);
+    i > 0 ? String(proof.below[i] - proof.below[i - 1]) : '', i > 0 ? countHere(i) : '', digits(proof.margin[i] ?? NaN, 2)]);
   return section('proof', heading, bank.completeness ? h('p', {}, `${bank.completeness}.`) : null,
     h('p', {}, 'The signs of the pivots of K − σM count the modes below a frequency exactly, independently of the iteration. Between '
       + 'two cuts both must agree.'),

@@ -162,6 +162,39 @@ TEST(Corrected, SelectTheBand) {
   EXPECT_LT(cut_across, static_cast<int>(kModes) - 1);
 }
 
+TEST(Corrected, SelectTheBandAtBothEnds) {
+  const Bank bank = example::make_corrected_bank(2, kModes);
+  std::vector<double> ends = bank.corrected.freq_hz;
+  std::sort(ends.begin(), ends.end());
+  int inside = 0;
+  for (std::size_t first = 1; first < kModes; ++first) {
+    for (std::size_t end = first; end <= kModes; ++end) {
+      Bank kept = bank;
+      kept.band_hz = {std::midpoint(ends[first - 1], ends[first]),
+                      end < kModes ? std::midpoint(ends[end - 1], ends[end]) : bank.band_hz[1]};
+      if (kept.band_hz[0] >= kept.band_hz[1]) continue;
+      keep_band(kept);
+      EXPECT_EQ(find_faults(kept), std::vector<std::string>{}) << first << " to " << end;
+      std::vector<double> here = kept.corrected.freq_hz;
+      std::sort(here.begin(), here.end());
+      EXPECT_EQ(here,
+                std::vector<double>(ends.begin() + static_cast<std::ptrdiff_t>(first), ends.begin() + static_cast<std::ptrdiff_t>(end)));
+      EXPECT_EQ(kept.proof->below_band_hz.size(), first);
+      EXPECT_EQ(find_version(kept), (std::array{1, 9})) << "older readers would miss modes";
+      for (const double hz : kept.proof->below_band_hz) inside += hz > kept.band_hz[0] ? 1 : 0;
+      const std::filesystem::path file = testing::TempDir() + "band.hdf";
+      write_bank(kept, file);
+      EXPECT_EQ(read_bank(file).proof->below_band_hz, kept.proof->below_band_hz);
+      Edits edits;
+      edits.stiffness_scale = 4.0;
+      EXPECT_EQ(find_faults(calc_edited(kept, edits)), std::vector<std::string>{});
+      kept.proof->below_band_hz.pop_back();  // a mode below the band is missing
+      EXPECT_FALSE(find_faults(kept).empty()) << first << " to " << end;
+    }
+  }
+  EXPECT_GT(inside, 0) << "modes of the mesh in the band are below it once corrected";
+}
+
 TEST(Corrected, TruncationIsIdempotent) {
   const Bank bank = example::make_corrected_bank(2, kModes);
   for (std::size_t first = 2; first < kModes; ++first) {
