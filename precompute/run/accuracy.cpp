@@ -35,7 +35,7 @@ constexpr double kLayered = 0.5;        // of the estimate of the widest bar: tr
 constexpr double kLayeredGrowth = 1.1;  // of the nodes with the second layer: the edges in the plane become longer
 constexpr double kApart = 0.5;          // maximum, of the corrections until then, so that the next mesh is far enough for a verdict
 constexpr double kMinStep = 0.9;        // maximum: nearly equal edges give no new information
-constexpr int kMaxCounts = 4;           // node counts tried per trial
+constexpr int kMaxCounts = 6;           // node counts tried per trial
 constexpr int kMaxRefinements = 4;      // of a mesh file: 4,096 elements per element
 
 /// To three digits, so that rounding on another number of ranks gives the same.
@@ -481,8 +481,10 @@ Body make_trial_body(Run& run, Setting& setting) {
     try {
       return make_body(run, setting);
     } catch (const CountRefusal& refusal) {
-      const std::int64_t nodes = refusal.get_possible_nodes();
+      std::int64_t nodes = refusal.get_possible_nodes();
       if (nodes == setting.nodes || count == kMaxCounts) throw;
+      // The mesher names a number that it is sure of; often far fewer suffice.
+      if (setting.nodes && nodes > 2 * *setting.nodes) nodes = 2 * *setting.nodes;
       run.log.print(fmt::format("{} nodes cannot be met on this body; {} are tried", setting.nodes.value_or(0), nodes));
       setting.nodes = nodes;
       check_count(run, setting);

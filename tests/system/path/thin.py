@@ -12,6 +12,30 @@ import solver
 from solver import GLASS, read_record, run
 
 
+def write_hollow_box(size, wall):
+    """OBJ of both sides of the wall of a closed box."""
+    lines, faces = [], [
+        (1, 3, 2),
+        (2, 3, 4),
+        (5, 6, 7),
+        (6, 8, 7),
+        (1, 2, 5),
+        (2, 6, 5),
+        (3, 7, 4),
+        (4, 7, 8),
+        (1, 5, 3),
+        (3, 5, 7),
+        (2, 4, 6),
+        (4, 8, 6),
+    ]
+    for inset in (0, wall):
+        corners = [[s - inset if k >> i & 1 else inset for i, s in enumerate(size)] for k in range(8)]
+        lines += [f"v {x:g} {y:g} {z:g}" for x, y, z in corners]
+    for a, b, c in faces:
+        lines += [f"f {a} {b} {c}", f"f {c + 8} {b + 8} {a + 8}"]
+    return "\n".join(lines) + "\n"
+
+
 def turn(profile, sides=48):
     """OBJ of a closed profile [(radius, height)] about the y axis, from pole to pole; its first and last radius are 0."""
     lines, rows = [], []
@@ -95,6 +119,14 @@ with tempfile.TemporaryDirectory() as top:
         7000 < trials[0]["nodes"] < 14000 and trials[-1]["modes"] > 0 and abs(trials[0]["nodes"] / trials[0]["body_nodes"] - 1) < 0.11
     ), trials
     print(f"cup: {trials[0]['nodes']} nodes in the first trial, {trials[-1]['worst_cents']:.1f} cents at the end")
+    # The count that the mesher is sure of is eight times that: one between is found first.
+    (folder / "box.obj").write_text(write_hollow_box((0.08, 0.06, 0.04), 0.002))
+    write_job(folder, {"surface": "box.obj"}, max_modes=6, band_hz=[20, 20000], accuracy_cents=100)
+    done = run(folder, "carillon-precompute", "job.json")
+    assert "6000 nodes cannot be met on this body; 12000 are tried" in done.stdout, done.stdout[-3000:] + done.stderr
+    trials = read_record(folder)["run"]["accuracy"]["trials"]
+    assert trials[0]["nodes"] < 15000 and trials[-1]["worst_cents"] <= 100, trials
+    print(f"hollow box: {[t['nodes'] for t in trials]} nodes, {trials[-1]['worst_cents']:.1f} cents")
     # Extrusion meets any count, and finer trials follow until the bars are met; the same for an open sheet.
     bowl = {"surface": "bowl.obj", "wall_m": 0.0012, "side": "middle"}
     for name, body, cents in (("thin cup", {"surface": "cup.obj"}, 150), ("bowl", bowl, 30)):
