@@ -15,6 +15,7 @@ struct Setting {
   std::optional<double> edge_m;       // or target edge length; neither: the mesher's default
   int refinements = 0;                // mesh file: uniform refinements, each splits a tetrahedron into eight
   int layers = 1;                     // body of a known shape: minimum of elements through its least thickness
+  bool extrudes = false;              // body from a surface: its wall is extruded, as on an earlier mesh
   double expected_hz = 0.0;           // guess of the last mode of "max_modes", from a coarser mesh; 0: none
 };
 

@@ -225,6 +225,7 @@ Setting Search::make_setting(job::Element element, double ratio) const {
   setting.element = element;
   setting.tolerance = tolerance_;
   setting.expected_hz = find_last_hz();
+  setting.extrudes = last.setting.extrudes || current_.body.is_extruded;  // finer ones would be far slower to make, and compare worse
   setting.nodes = std::llround(static_cast<double>(last.nodes) * std::pow(ratio, -find_dimension()));
   return setting;
 }
@@ -488,6 +489,9 @@ Body make_trial_body(Run& run, Setting& setting) {
       run.log.print(fmt::format("{} nodes cannot be met on this body; {} are tried", setting.nodes.value_or(0), nodes));
       setting.nodes = nodes;
       check_count(run, setting);
+    } catch (const InputError&) {
+      if (!setting.extrudes) throw;
+      setting.extrudes = false;
     }
   }
 }

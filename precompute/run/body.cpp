@@ -81,8 +81,9 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
   const bool quadratic = setting.element == job::Element::T10;
   const job::JobSpec& job = run.job;
   MesherWords words;
-  mesh::TetMesh mesh = job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m, setting.layers}, words)
-                                : mesh::read_mesh(job.mesh);
+  mesh::TetMesh mesh =
+      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m, setting.layers, setting.extrudes}, words)
+               : mesh::read_mesh(job.mesh);
   body.mesher_warnings = std::move(words.warnings);
   for (const std::string& warning : body.mesher_warnings) run.log.warn_once(warning);
   for (const std::string& remark : words.remarks) run.log.print(remark);
@@ -93,6 +94,7 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
   for (const std::string& remark : mesh.remarks) run.log.warn_once(remark);
   body.check = mesh::check_mesh(mesh, body.source);
   body.region_names = mesh.region_names;
+  body.is_extruded = job.body && job.body->shape.empty() && mesh.node_sets.contains("outer") && mesh.node_sets.contains("inner");
   body.file_materials = std::move(mesh.materials);
   warn_of_mesh(run, body);
   if (job.body && job.body->shape.empty() && body.check.components > 1)
@@ -156,7 +158,8 @@ bool is_parallel_format(const Run& run) {
 Body make_body(Run& run, const Setting& setting) {
   if (is_parallel_format(run)) return read_in_parallel(run, setting);
   Body body;
-  body.source = run.job.body ? describe(*run.job.body, {setting.nodes, setting.edge_m, setting.layers}) : run.job.mesh.string();
+  body.source =
+      run.job.body ? describe(*run.job.body, {setting.nodes, setting.edge_m, setting.layers, setting.extrudes}) : run.job.mesh.string();
   run.log.begin("read", body.source);
   mesh::TetMesh mesh;
   std::vector<FixedNode> fixed;

@@ -73,7 +73,7 @@ std::vector<std::string> make_mesher_words(const job::Body& body, int order, con
   if (body.facets) words.emplace_back("--facets");
   add("--result", file + ".result");
   add("--up", body.up);
-  add("--method", body.method);
+  add("--method", fineness.extrudes ? "extrude" : body.method);
   if (fineness.nodes) add("--nodes", std::to_string(*fineness.nodes));
   if (fineness.edge_m) add("--edge", format_length(*fineness.edge_m));
   return words;

@@ -18,7 +18,8 @@ namespace carillon::run {
 struct Fineness {
   std::optional<std::int64_t> nodes;  // mid-side nodes included
   std::optional<double> edge_m;
-  int layers = 1;  // of a known shape, at least
+  int layers = 1;         // of a known shape, at least
+  bool extrudes = false;  // a surface, whatever its method
 };
 
 /// The mesher's messages on a mesh.

@@ -42,6 +42,7 @@ struct Body {
   mesh::CheckReport check;                           // rank 0
   std::vector<std::string> mesher_warnings;          // differences between mesh and surface; rank 0
   std::int64_t fixed_nodes = 0;                      // rank 0
+  bool is_extruded = false;                          // from a surface with a thin wall; rank 0
   Surface surface;                                   // rank 0
   std::map<std::int32_t, std::string> region_names;  // rank 0
   fem::FileMaterials file_materials;                 // rank 0

@@ -26,6 +26,7 @@ void write_setting(eigen::NumberWriter& to, const Setting& setting) {
   to.add(setting.edge_m.value_or(0));
   to.add(static_cast<std::int64_t>(setting.refinements));
   to.add(static_cast<std::int64_t>(setting.layers));
+  to.add(static_cast<std::int64_t>(setting.extrudes));
   to.add(setting.expected_hz);
 }
 
@@ -39,6 +40,7 @@ Setting read_setting(eigen::NumberReader& from) {
   if (edge_m > 0) setting.edge_m = edge_m;
   setting.refinements = static_cast<int>(from.get_count(0, 100));
   setting.layers = static_cast<int>(from.get_count(1, 100));
+  setting.extrudes = from.get_count(0, 1) == 1;
   setting.expected_hz = from.get_double();
   const bool is_known = setting.tolerance > 0 && setting.tolerance < 1 && setting.expected_hz >= 0;
   if (!is_known) throw InputError("a number in it is out of range");
