@@ -122,6 +122,33 @@ void add_sensitivity_fields(const Sensitivities& s, const FileForm& form, std::v
                       s.own_error_cents.data()});
 }
 
+void add_proof_fields(const Proof& proof, const FileForm& form, std::vector<Field>& fields) {
+  const auto& rigid = proof.rigid_per_component;
+  fields.insert(
+      fields.end(),
+      {{"proof/cut_hz", "<f8", find_shape(proof.cut_hz), "Hz", "where eigenvalues were counted", proof.cut_hz.data()},
+       {"proof/below", "<i8", find_shape(proof.below), "1", "eigenvalues below the cut, by inertia", proof.below.data()},
+       {"proof/margin", "<f8", find_shape(proof.margin), "1", "relative distance in lambda to the nearest mode", proof.margin.data()},
+       {"proof/rigid_per_component", "<i8", find_shape(rigid), "1", "rigid motions of each component", rigid.data()},
+       {"proof/found", "<i8", {}, "1", "modes found between the first and the last cut", &proof.found},
+       {"proof/orthonormality", "<f8", {}, "1", "max |phi_i^T M phi_j - delta_ij|", &proof.orthonormality},
+       {"proof/backward_error", "<f8", {}, "1", "of the worst factorisation", &proof.backward_error},
+       {"proof/cluster_first", "<i8", find_shape(proof.cluster_first), "1", "first of a group of degenerate modes",
+        proof.cluster_first.data()},
+       {"proof/cluster_count", "<i8", find_shape(proof.cluster_count), "1", "modes of the group", proof.cluster_count.data()},
+       {"proof/method", text_type(form.proof_method), {}, "1", "how it was counted", form.proof_method.data()}});
+  if (!proof.below_band_hz.empty())
+    fields.push_back({"proof/below_band_hz", "<f8", find_shape(proof.below_band_hz), "Hz",
+                      "modes of the mesh whose corrected frequencies are below the band", proof.below_band_hz.data()});
+  if (form.has_complete_below)
+    fields.push_back({"proof/complete_below_hz",
+                      "<f8",
+                      {},
+                      "Hz",
+                      "every mode of the mesh from the first cut to here is in the bank",
+                      &proof.complete_below_hz});
+}
+
 /// Fields since version 1.1.
 void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>& fields) {
   const auto add_errors = [&](const char* name, const char* meaning, const std::vector<double>& cents) {
@@ -178,32 +205,7 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
   if (!bank.multipoles.is_empty()) add_radiation_fields(bank.multipoles, form, fields);
   if (!bank.quartic.is_empty()) add_nonlinear_fields(bank.quartic, form, fields);
   if (!bank.sensitivities.is_empty()) add_sensitivity_fields(bank.sensitivities, form, fields);
-  if (!bank.proof) return;
-  const Proof& proof = *bank.proof;
-  const auto& rigid = proof.rigid_per_component;
-  fields.insert(
-      fields.end(),
-      {{"proof/cut_hz", "<f8", find_shape(proof.cut_hz), "Hz", "where eigenvalues were counted", proof.cut_hz.data()},
-       {"proof/below", "<i8", find_shape(proof.below), "1", "eigenvalues below the cut, by inertia", proof.below.data()},
-       {"proof/margin", "<f8", find_shape(proof.margin), "1", "relative distance in lambda to the nearest mode", proof.margin.data()},
-       {"proof/rigid_per_component", "<i8", find_shape(rigid), "1", "rigid motions of each component", rigid.data()},
-       {"proof/found", "<i8", {}, "1", "modes found between the first and the last cut", &proof.found},
-       {"proof/orthonormality", "<f8", {}, "1", "max |phi_i^T M phi_j - delta_ij|", &proof.orthonormality},
-       {"proof/backward_error", "<f8", {}, "1", "of the worst factorisation", &proof.backward_error},
-       {"proof/cluster_first", "<i8", find_shape(proof.cluster_first), "1", "first of a group of degenerate modes",
-        proof.cluster_first.data()},
-       {"proof/cluster_count", "<i8", find_shape(proof.cluster_count), "1", "modes of the group", proof.cluster_count.data()},
-       {"proof/method", text_type(form.proof_method), {}, "1", "how it was counted", form.proof_method.data()}});
-  if (!proof.below_band_hz.empty())
-    fields.push_back({"proof/below_band_hz", "<f8", find_shape(proof.below_band_hz), "Hz",
-                      "modes of the mesh whose corrected frequencies are below the band", proof.below_band_hz.data()});
-  if (form.has_complete_below)
-    fields.push_back({"proof/complete_below_hz",
-                      "<f8",
-                      {},
-                      "Hz",
-                      "every mode of the mesh from the first cut to here is in the bank",
-                      &proof.complete_below_hz});
+  if (bank.proof) add_proof_fields(*bank.proof, form, fields);
 }
 
 /// Fields of packed banks that replace mesh and shapes.

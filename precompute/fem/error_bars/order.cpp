@@ -2,8 +2,8 @@
 //   part: one above the list, computed at F or higher, has a true value of at least F 2^(-b/1200), b being the bar of a mode there; one
 //   below, computed at F or lower, at most F 2^(b/1200).
 // Deviations: b is an estimate. Bars of different kinds of modes (bending, stretching) differ a hundredfold and are far apart in frequency,
-//   so b is the widest bar within about an octave of the end of the list, extrapolated if bars grow from octave to octave. F is the worst case as
-//   long as b < 1731 cents times the growth exponent; wider bars are useless anyway.
+//   so b is the widest bar within kAboutOctave of the end of the list, extrapolated if bars grow from octave to octave. F is the worst case
+//   as long as b < 1731 cents times the growth exponent; wider bars are useless anyway.
 #include "precompute/fem/error_bars/order.hpp"
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 namespace carillon::error_bars {
 namespace {
 
-constexpr double kOctave = 1200.0;  // cents
+constexpr double kOctave = 1200.0;       // cents
 constexpr double kAboutOctave = 1250.0;  // a little more: the second mode of a kind (torsion) may be an octave above the first
 
 /// Bar of a mode at `top`, at or above the last. at: positions of the modes [cents], ascending.
