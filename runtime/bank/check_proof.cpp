@@ -86,7 +86,7 @@ Check check_cuts(const Bank& bank, const Proof& proof) {
 /// Modes of the bank against the counts, in each interval between cuts.
 Check check_completeness(const Bank& bank, const Proof& proof) {
   Faults faults;
-  const auto modes = static_cast<std::int64_t>(bank.mode_count()), left_out = std::ssize(proof.below_band_hz);
+  const auto modes = static_cast<std::int64_t>(bank.mode_count()), left_out = static_cast<std::int64_t>(proof.below_band_hz.size());
   const std::int64_t counted = proof.below.back() - proof.below.front();
   for (std::size_t i = 0; i + 1 < proof.cut_hz.size(); ++i) {
     const std::int64_t wanted = proof.below[i + 1] - proof.below[i];
@@ -108,7 +108,7 @@ Check check_completeness(const Bank& bank, const Proof& proof) {
   }
   const bool is_corrected = modes == 0 || !bank.corrected.is_empty();
   if (left_out > 0 && !is_corrected) faults.add("below_band_hz has {} modes, and none has a corrected frequency", left_out);
-  if (!std::ranges::is_sorted(proof.below_band_hz)) faults.add("below_band_hz does not ascend");
+  if (!std::is_sorted(proof.below_band_hz.begin(), proof.below_band_hz.end())) faults.add("below_band_hz does not ascend");
   // A complete bank without modes of the mesh lacks those whose corrected frequencies are above the band.
   const bool may_lack = !bank.complete || (is_corrected && proof.found == counted && proof.found > known);
   if (may_lack ? !(proof.complete_below_hz >= 0.0) : proof.complete_below_hz != 0.0)
