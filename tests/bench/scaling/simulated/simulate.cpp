@@ -125,7 +125,7 @@ int MPI_Isend(const void* from, int count, MPI_Datatype type, int to, int tag, M
   settle();
   return PMPI_Isend(from, count, type, to, tag, comm, request);
 }
-// Only solves use these, with a status that nobody reads.
+// For solves, which ignore the status.
 int MPI_Test(MPI_Request* request, int* has_come, MPI_Status*) {
   settle();
   MPI_Status status;
