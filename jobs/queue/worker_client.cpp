@@ -54,7 +54,7 @@ bool WorkerClient::make_worker() {
                            .input = other.get(),
                            .group = base::Command::Group::session,
                            .default_signals = true});
-  } catch (const SystemError&) {  // an attempt says what is missing
+  } catch (const SystemError&) {  // reported by the next attempt
     socket_.close();
     return false;
   }

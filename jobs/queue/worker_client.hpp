@@ -18,7 +18,7 @@ namespace carillon::queue {
 class WorkerClient {
  public:
   /// Starts the attempt with these words (attempt::make_arguments()) as a child of this process, in its own session, with its output in
-  /// `log`. None: there is no worker, and the caller starts the program itself.
+  /// `log`. nullopt: no worker; the caller starts the program.
   std::optional<pid_t> start(const std::filesystem::path& log, const std::vector<std::string>& words);
 
  private:

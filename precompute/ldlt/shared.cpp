@@ -19,9 +19,6 @@ namespace {
 
 enum Kind : std::int32_t { kUpdate, kDiagonal, kPanel, kAbort };
 
-/// Consecutive factorisations use different tags, as a rank may be one ahead.
-constexpr int kTag = 64;
-
 /// Numbers of D^-1 before the rows of a panel: diagonal and off-diagonal.
 constexpr std::int64_t kPivotNumbers = 2 * kMaxBlock;
 
@@ -55,7 +52,7 @@ SharedFactoriser::SharedFactoriser(const Plan& plan, Numbers& numbers, const std
       numbers_(numbers),
       blocks_(blocks),
       kernels_(find_factor_kernels()),
-      mailbox_(plan.comm, kTag + numbers.generation % 2, {numbers.panels.data(), static_cast<std::size_t>(plan.room.panels)}),
+      mailbox_(plan.comm, kLetterTag + numbers.generation % 2, {numbers.panels.data(), static_cast<std::size_t>(plan.room.panels)}),
       works_(plan.shared.size()),
       block_(plan.shared.empty() ? 0 : kMaxBlock * kMaxBlock),
       left_(static_cast<int>(plan.shared.size())) {

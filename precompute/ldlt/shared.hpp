@@ -12,6 +12,9 @@
 
 namespace carillon::ldlt {
 
+/// Tag of the letters, and of those of the next factorisation this + 1: a rank may be one ahead.
+inline constexpr int kLetterTag = 64;
+
 /// Factorises this rank's tiles of shared fronts. Never waits for a particular message: among the fronts with complete children it takes
 /// the first possible step in the order of the plan. Each tile is updated panel by panel, and children are added in order, so the result
 /// does not depend on message timing.

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cstring>
 #include <deque>
-#include <functional>
 #include <list>
 #include <map>
 #include <numeric>
@@ -304,10 +303,7 @@ class Solver {
                   list_rows(front, k + 1));
       if (in.empty()) continue;
       subtract_column(front, tiles, k, next, behind, in);
-      for (std::int32_t row = behind; row < front.own_nodes(); row += kPanelNodes)
-        later_.push_back({k, [this, &front, &in, tiles, k, row] {
-                            subtract_column(front, tiles, k, row, std::min(row + kPanelNodes, front.own_nodes()), in);
-                          }});
+      defer(&Solver::subtract_column, front, tiles, k, in);
     }
     do_later(0);
     for (const SumMessage& sums : front.to_parent) send_sums(sums, kSums);
@@ -334,10 +330,7 @@ class Solver {
           kernels_.multiply_by_d_inverse(numbers_.d_diagonal.data() + panel.pivots, numbers_.d_off.data() + panel.pivots, n,
                                          blocks_[b].width / 8, own[b], sums[b]);
       }
-      for (std::int32_t row = behind; row < front.own_nodes(); row += kPanelNodes)
-        later_.push_back({k, [this, &front, &sums, &panel, k, row] {
-                            subtract_rows(front, numbers_.find_tiles(panel), k, row, std::min(row + kPanelNodes, front.own_nodes()), sums);
-                          }});
+      defer(&Solver::subtract_rows, front, numbers_.find_tiles(panel), k, sums);
     }
     for (int k = front.map.pivot_tiles(); k-- > 0;) {
       const SharedPanel& panel = numbers_.shared[f][k];
@@ -385,12 +378,37 @@ class Solver {
       kernels_.subtract_transposed(from, 3 * (end - begin), n, blocks_[b].width / 8, nodes_.data() + begin, blocks_[b].rows, sums[b], from);
   }
 
-  // ---- messages ----
+  using Subtract = void (Solver::*)(const SharedFront& front, const double* tiles, int k, std::int32_t begin, std::int32_t end,
+                                    const std::vector<double*>& rows);
+  /// Deferred product of a tile behind the pivots of a front.
+  struct Later {
+    Subtract subtract;
+    const SharedFront* front;
+    const double* tiles;
+    int panel;
+    std::int32_t row;
+    const std::vector<double*>* rows;
+  };
+
+  /// Defers the products of panel k with the rows behind the pivots. `rows` must stay until they are done.
+  void defer(Subtract subtract, const SharedFront& front, const double* tiles, int k, const std::vector<double*>& rows) {
+    for (std::int32_t row = front.row_begin[front.map.pivot_tiles()]; row < front.own_nodes(); row += kPanelNodes)
+      later_.push_back({subtract, &front, tiles, k, row, &rows});
+  }
+
+  void do_next() {
+    const Later next = later_.front();
+    later_.pop_front();
+    (this->*next.subtract)(*next.front, next.tiles, next.panel, next.row, std::min(next.row + kPanelNodes, next.front->own_nodes()),
+                           *next.rows);
+  }
 
   /// Does the deferred products of panels >= k.
   void do_later(int k) {
-    for (; !later_.empty() && later_.front().panel >= k; later_.pop_front()) later_.front().work();
+    while (!later_.empty() && later_.front().panel >= k) do_next();
   }
+
+  // ---- messages ----
 
   /// Sums to or from this rank itself are kept by child, without a message.
   void send_sums(const SumMessage& sums, Tag tag) {
@@ -476,11 +494,11 @@ class Solver {
   void receive_numbers(int rank, int tag, double* to, std::size_t count) {
     MPI_Request request = MPI_REQUEST_NULL;
     MPI_Irecv(to, static_cast<int>(count), MPI_DOUBLE, rank, tag, plan_.comm, &request);
-    for (; !later_.empty(); later_.pop_front()) {
+    while (!later_.empty()) {
       int has_come = 0;
       MPI_Test(&request, &has_come, MPI_STATUS_IGNORE);
       if (has_come != 0) return;
-      later_.front().work();
+      do_next();
     }
     MPI_Wait(&request, MPI_STATUS_IGNORE);
   }
@@ -499,12 +517,7 @@ class Solver {
   int row_width_ = 0;
   double* columns_ = nullptr;                         // Workspace::columns
   std::map<std::int32_t, std::vector<double>> kept_;  // by child
-  /// Products of a panel of the current front that no panel waits for yet: tiles in rows behind the pivots.
-  struct Later {
-    int panel;
-    std::function<void()> work;
-  };
-  std::deque<Later> later_;
+  std::deque<Later> later_;                           // of the current front
   std::list<std::vector<double>> messages_;
   std::vector<double> received_;
   std::vector<MPI_Request> requests_;

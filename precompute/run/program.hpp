@@ -11,10 +11,10 @@ namespace carillon::run {
 /// Executes a command line and returns the exit code; starts MPI, PETSc and SLEPc.
 int run_program(int argc, char** argv);
 
-/// In a process that has started them: loads, looks up and allocates what every run would, for its forks.
+/// After the start of MPI and PETSc: loads and allocates the common data of all runs, for forks of this process.
 void prepare_forks();
 
-/// The same as run_program() in a fork of such a process. Words after "--", options of PETSc, have no effect.
+/// run_program() in such a fork. Words after "--", options of PETSc, have no effect.
 int run_program(const petsc::Session& session, std::vector<std::string> words);
 
 }  // namespace carillon::run

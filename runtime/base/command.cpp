@@ -99,16 +99,12 @@ struct Plan {
 
 bool is_fault(int signal) { return signal == SIGSEGV || signal == SIGBUS || signal == SIGFPE || signal == SIGABRT || signal == SIGILL; }
 
-/// As exec does.
+/// Like exec, closes the descriptors with FD_CLOEXEC.
 void close_marked_descriptors() {
-  std::error_code error;
-  std::vector<int> marked;
-  for (fs::directory_iterator it("/proc/self/fd", error), end; !error && it != end; it.increment(error)) {
-    const int descriptor = std::atoi(it->path().filename().c_str());
+  for (const int descriptor : list_descriptors()) {
     const int flags = ::fcntl(descriptor, F_GETFD);
-    if (descriptor > STDERR_FILENO && flags >= 0 && (flags & FD_CLOEXEC) != 0) marked.push_back(descriptor);
+    if (descriptor > STDERR_FILENO && flags >= 0 && (flags & FD_CLOEXEC) != 0) ::close(descriptor);
   }
-  for (const int descriptor : marked) ::close(descriptor);
 }
 
 /// In a fork, in place of exec.

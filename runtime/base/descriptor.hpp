@@ -5,6 +5,7 @@
 
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace carillon::base {
 
@@ -28,6 +29,9 @@ class Descriptor {
  private:
   int value_;
 };
+
+/// Open descriptors of this process, in any order.
+std::vector<int> list_descriptors();
 
 /// Writes all bytes. Returns 0 or errno; ENOSPC if write() accepts no more.
 int write_all(int descriptor, std::string_view bytes) noexcept;

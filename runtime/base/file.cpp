@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cctype>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <system_error>
 #include <utility>
@@ -119,6 +120,14 @@ int link_nameless(int descriptor, const fs::path& name) {
 }
 
 }  // namespace
+
+std::vector<int> list_descriptors() {
+  std::vector<int> open;
+  std::error_code error;
+  for (fs::directory_iterator it("/proc/self/fd", error), end; !error && it != end; it.increment(error))
+    open.push_back(std::atoi(it->path().filename().c_str()));
+  return open;
+}
 
 int write_all(int descriptor, std::string_view bytes) noexcept {
   while (!bytes.empty()) {

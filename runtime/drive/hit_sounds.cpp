@@ -102,7 +102,7 @@ bool HitSounds::Contact::needs_modes() const {
          rigid.speed_m_s > kMinImpactSpeed && hit.approach_m_s > rigid::kMinImpactSpeedMS;
 }
 
-/// Hits of a step that share a motion: each as an impact of its own may have more energy than its part of the loss, all together not.
+/// Divides the energy lost in a step among the hits of connected bodies, in proportion to that of each as a separate impact.
 void HitSounds::share_energy(const StepView& step, std::vector<FinishedHit>& hits) {
   if (hits.empty()) return;
   base::Groups groups(static_cast<int>(step.bodies.size()));

@@ -61,8 +61,8 @@ struct StruckBody {
 
 /// Largest x <= `factor` with x * shared_j + x^2 * own_j <= most_j; own_j and most_j >= 0.
 double limit_factor(double factor, double shared_j, double own_j, double most_j);
-/// Largest factor of the further forces, at most `factor`, with which the modes of all bodies have at no instant more than `during_j` above
-/// what they have without these forces, and not more than `after_j` once these are over [J].
+/// Largest factor <= `factor` of the further forces that limits the modal energy they add [J]: `during_j` at every instant, `after_j` at
+/// their end.
 double limit_further(std::span<const StruckBody> bodies, double factor, double during_j, double after_j);
 
 }  // namespace carillon::drive

@@ -42,7 +42,7 @@ struct SilentBody {
   std::string origin;                                    // for the record
 };
 
-/// Throws InputError for what is no body: an open surface, one that faces inward. `warnings`: those of settle_rigid() are appended.
+/// Throws InputError for an open or inward-facing surface. `warnings`: those of settle_rigid() are appended.
 bank::Bank make_silent_bank(const SilentBody& body, std::vector<std::string>& warnings);
 
 }  // namespace carillon::exchange

@@ -68,7 +68,7 @@ sigset_t make_signals() {
   return set;
 }
 
-/// Ends what the solver has left. This process is a subreaper: all its descendants are below its children.
+/// Ends the solver's remaining descendants. Orphans among them are children of this process, a subreaper.
 void end_descendants(const std::string& entry) {
   while (::waitpid(-1, nullptr, WNOHANG) > 0) {
   }

@@ -1,8 +1,8 @@
-// carillon-worker: keeps MPI, PETSc and SLEPc for the attempts of one `carillon run` on one rank. Each attempt is a fork, and its solver a
-// fork of that, so the end of one harms no other. Method:     Words of `carillon attempt` come as messages of a socket, the standard input;
-// the answer is the number of the attempt's
-//             process. That is made by a fork that ends at once, so the queue, a subreaper, becomes the parent. MPI runs as an isolated
-//             singleton, which shares nothing with other processes; forks end without MPI_Finalize.
+// carillon-worker: one start of MPI, PETSc and SLEPc for the one-rank attempts of a `carillon run`. Each attempt is a fork, its solver a
+// fork of that: crashes are isolated.
+// Method:     Standard input is a socket: a request is the words of `carillon attempt`, the reply the process number of the attempt. A
+//             short-lived intermediate process forks it, so the queue, a subreaper, becomes its parent. MPI is an isolated singleton;
+//             forks end without MPI_Finalize.
 // Source:     Linux prctl(2) (PR_SET_CHILD_SUBREAPER), unix(7), fork(2).
 #include <fcntl.h>
 #include <fmt/core.h>
@@ -15,10 +15,8 @@
 #include <cerrno>
 #include <cstdlib>
 #include <exception>
-#include <filesystem>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
 #include "jobs/queue/attempt/attempt.hpp"
@@ -40,13 +38,10 @@ using namespace carillon;
 constexpr int kIdleMs = 10'000;  // then it ends: memory, and the files of a new installation
 constexpr std::size_t kMaxMessage = 1 << 16;
 
-/// Those of the libraries stay open in forks, as they do without exec.
+/// Descriptors of the libraries stay open in forks.
 void keep_descriptors() {
-  std::error_code error;
-  for (std::filesystem::directory_iterator it("/proc/self/fd", error), end; !error && it != end; it.increment(error)) {
-    const int descriptor = std::atoi(it->path().filename().c_str());
+  for (const int descriptor : base::list_descriptors())
     if (descriptor > STDERR_FILENO) ::fcntl(descriptor, F_SETFD, 0);
-  }
 }
 
 std::vector<std::string> split(std::string_view message) {

@@ -168,14 +168,15 @@ class Live(unittest.TestCase):
             self.assertEqual(refused, "0")
             self.assertGreater(int(strikes), rendered / 2)
 
-    def test_messages_of_osc_move_bodies(self):
-        scene = json.loads(self.scene.read_text())
-        scene["duration_s"] = 60.0
-        scene["strikes"] = []
+    def play_for_osc(self):
+        """carillon-live with a minute of the scene without strikes; prints its port first."""
         path = self.root / "osc.json"
-        path.write_text(json.dumps(scene))
+        path.write_text(json.dumps({**json.loads(self.scene.read_text()), "duration_s": 60.0, "strikes": []}))
         words = [BIN / "carillon-live", path, "--null", "--osc", "0", "--look-ahead", "0.05"]
-        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as player:
+        return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def test_messages_of_osc_move_bodies(self):
+        with self.play_for_osc() as player:
             to = ("127.0.0.1", int(player.stdout.readline().split()[-1]))
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
                 say = lambda *message: out.sendto(osc(*message), to)
@@ -219,11 +220,7 @@ class Live(unittest.TestCase):
             self.assertIn("is no port; give one like 9000", refused.stderr)
 
     def test_a_flood_of_garbage_hides_no_error_of_a_command(self):
-        scene = {**json.loads(self.scene.read_text()), "duration_s": 60.0, "strikes": []}
-        path = self.root / "flood.json"
-        path.write_text(json.dumps(scene))
-        words = [BIN / "carillon-live", path, "--null", "--osc", "0", "--look-ahead", "0.05"]
-        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as player:
+        with self.play_for_osc() as player:
             to = ("127.0.0.1", int(player.stdout.readline().split()[-1]))
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
                 for _ in range(5):

@@ -18,6 +18,7 @@
 #include "precompute/ldlt/factor.hpp"
 #include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/mailbox.hpp"
+#include "precompute/ldlt/shared.hpp"
 #include "precompute/mesh/read.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
@@ -47,7 +48,7 @@ struct Core {
   double block_flops = 1e9 * read_core("block_gflops");    // diagonal blocks: n^3
   double solve_flops = 1e9 * read_core("solve_gflops");
   double solve_bytes = 1e9 * read_core("solve_gb_s");  // of L
-  double copy_bytes = 1e9 * read_core("copy_gb_s");    // contributions; messages as they arrive; what packs and unpacks them
+  double copy_bytes = 1e9 * read_core("copy_gb_s");    // contributions, arriving messages, packing, unpacking
   double message_s = 1e-6 * read_core("message_us");   // to send one, or to receive it
 };
 const Core& find_core() {
@@ -64,7 +65,7 @@ struct Done {
 Done done;
 
 /// Letters of factorisations (SharedFactoriser) are packed and unpacked. Solves do that by kernels, where they must.
-bool is_letter(int tag) { return tag == 64 || tag == 65; }
+bool is_letter(int tag) { return tag == carillon::ldlt::kLetterTag || tag == carillon::ldlt::kLetterTag + 1; }
 
 /// Adds the charged time to the simulated clock.
 void settle() {
