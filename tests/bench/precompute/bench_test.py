@@ -88,6 +88,12 @@ class Measuring(unittest.TestCase):
         self.assertEqual(comparing.compare_frequencies([100.0], [100.0, 200.0]), float("inf"))
         self.assertAlmostEqual(comparing.compare_frequencies([100.0, 200.2], [100.0, 200.0]), 0.001, 6)
 
+    def test_modes_at_a_cut_of_corrected_frequencies_are_not_compared(self):
+        bank = {"modes/frequency_hz": numpy.array([100.0, 200.0, 400.0])}
+        self.assertEqual(comparing.find_complete_modes(bank), [100.0, 200.0, 400.0])
+        bank |= {"proof/below_band_hz": numpy.array([90.0]), "proof/complete_below_hz": numpy.float64(200.0)}
+        self.assertEqual(comparing.find_complete_modes(bank), [90.0, 100.0, 200.0])
+
     def test_a_wrong_answer_is_found(self):
         stiffness, mass = scipy.sparse.diags(numpy.arange(1.0, 9.0)), scipy.sparse.identity(8)
         values, vectors = numpy.arange(1.0, 9.0), numpy.eye(8)

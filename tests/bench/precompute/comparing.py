@@ -62,6 +62,14 @@ def find_extras(record, total_s):
     return rows
 
 
+def find_complete_modes(bank):
+    """Frequencies [Hz] on the mesh, ascending, from the lower end of the band up to which no mode of the mesh is missing. The band is of
+    corrected frequencies: at its upper end some modes of the mesh are left out and higher ones kept, which no rival can know."""
+    below = bank["proof/below_band_hz"][:].tolist() if "proof/below_band_hz" in bank else []
+    complete_hz = bank["proof/complete_below_hz"][()] if "proof/complete_below_hz" in bank else float("inf")
+    return below + [hz for hz in bank["modes/frequency_hz"][:].tolist() if hz <= complete_hz]
+
+
 def compare_frequencies(reference_hz, other_hz):
     """Largest relative difference; infinite if the counts differ."""
     if len(reference_hz) != len(other_hz):
