@@ -19,7 +19,7 @@ constexpr int kMaxMissed = 30;            // per step: instants at which no touc
 constexpr int kMaxSought = 3;             // of these, with a search for closings on the path
 constexpr int kMaxCompleted = 4;          // repeated solutions of a step with missing touches added
 constexpr int kMaxShortened = 8;          // times that a step without impacts is shortened
-constexpr int kMaxHalved = 3;             // halvings of a step without impacts
+constexpr int kMaxHalved = 3;             // halvings of a step in which nothing strikes
 constexpr double kMaxAheadM = 5e-5;       // m; permitted depth at its end: the gaps of fast turning bodies are not linear
 constexpr int kMaxImpacts = 4;            // individual impacts of an island per step; an island with more is crowded
 constexpr int kMinImpacts = 2;            // the same for the largest islands, whose impacts cost more
@@ -148,14 +148,17 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       h = stops_s;
       solve();
     }
-    for (int n = 0; n < kMaxHalved && impacts >= max_impacts && depth_m > kMaxAheadM; ++n) {
-      h *= 0.5;
-      solve();
-    }
     double at = h;
     std::vector<ContactRef> first;
     step_.together_s = kSimultaneousS;
-    const bool struck = impacts < max_impacts && instants_.find(step_, at, first);
+    bool struck = false;
+    for (int n = 0;; ++n) {
+      at = h;
+      struck = impacts < max_impacts && instants_.find(step_, at, first);
+      if (struck || depth_m <= kMaxAheadM || n == kMaxHalved) break;
+      h *= 0.5;
+      solve();
+    }
     problem_.keep_impulses(step_, at);
     for (Pair* pair : island.pairs) touches_.travel(*pair, at, h);
     move(start_s + done + at, at);
@@ -277,7 +280,11 @@ void Space::strike(const std::vector<ContactRef>& first) {
   strike.together_s = step_.together_s;
   modal_states_.excite(strike, lost_j);
   rest_.reset(strike.bodies);
+  // Pairs that come into reach are met in this step already; those with other islands wait for the next.
+  const std::size_t near = windows_.near().size();
   for (const int body : strike.bodies) windows_.extend(body);
+  for (std::size_t n = near; n < windows_.near().size(); ++n)
+    if (step_.has(*windows_.near()[n])) step_.island().pairs.push_back(windows_.near()[n]);
   keep_triangles(strike.hits);
 }
 
