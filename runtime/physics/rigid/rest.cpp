@@ -23,7 +23,7 @@ constexpr double kNeighbourSlowS = 0.05;   // s; and of the bodies that it touch
 constexpr double kMaxTouchSpeedMS = 5e-4;  // m/s; with no faster contact
 constexpr double kStillM = 5e-5;           // m; a body stays in place while no point moves farther
 constexpr double kWakeForceRatio = 0.05;   // fraction of the weight: change of the forces that wakes a body
-constexpr double kSwingRatio = 0.35;       // movement of a swing in place, relative to the radius of the body
+constexpr double kSwingRatio = 0.8;        // movement of a swing in place, relative to the radius of the body
 constexpr double kSwingDelayS = 0.5;       // s; swing in place before the rolling resistance grows
 constexpr double kSettlingPerS = 20.0;     // 1/s; growth of the resistance, relative to its value
 constexpr double kMaxSettling = 30.0;      // largest resistance, likewise
@@ -77,7 +77,8 @@ void Rest::note_swings() {
   for (int i = 0; i < bodies_.count(); ++i) {
     if (!bodies_.moves(i)) continue;
     Pace& pace = paces_[i];
-    const bool swings = supports[i] == kMany && bodies_.get_pull(i) == 0.0 && bodies_.find_articulation(i) == nullptr &&
+    if (supports[i] == kMany) pace.leaned_s = now_s;
+    const bool swings = now_s - pace.leaned_s <= kSwingDelayS && bodies_.get_pull(i) == 0.0 && bodies_.find_articulation(i) == nullptr &&
                         calc_distance(bodies_.solid(i), bodies_.state(i), pace.swing) <= kSwingRatio * bodies_.solid(i).radius_m;
     if (!swings) {
       pace.swing = bodies_.state(i);
