@@ -4,37 +4,49 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <cstddef>
+#include <functional>
 #include <iterator>
+#include <queue>
 #include <utility>
 
 namespace carillon::drive {
 namespace {
 
-using Amplitudes = std::vector<std::complex<double>>;  // n
+/// Complex amplitudes of the modes. Plain numbers, as products of std::complex check for NaN, which takes most of the time.
+struct Amplitudes {
+  std::vector<double> real, imag;  // n
+
+  explicit Amplitudes(std::size_t n) : real(n), imag(n) {}
+};
 
 /// The pieces of a force one after the other, as changes of the amplitudes at `at_s`.
 class Pieces {
  public:
-  Pieces(const impact::Modes& modes, const ModalForce& force, double at_s, std::size_t first) : force_(&force), next_(first) {
+  Pieces(const impact::Modes& modes, const ModalForce& force, double at_s, std::size_t first)
+      : force_(&force), next_(first), turned_(modes.get_omega().size()), turn_(modes.get_omega().size()) {
     const double middle_s = force.start_s + (static_cast<double>(first) + 0.5) * force.step_s;
-    for (const double omega : modes.get_omega()) {
-      const double x = 0.5 * omega * force.step_s;
-      turned_.push_back(std::polar(x > 0.0 ? std::sin(x) / x : 1.0, omega * (at_s - middle_s)));
-      turn_.push_back(std::polar(1.0, -omega * force.step_s));
+    for (std::size_t m = 0; m < turn_.real.size(); ++m) {
+      const double omega = modes.get_omega()[m], x = 0.5 * omega * force.step_s, s = std::sin(x), c = std::cos(x);
+      const double size = x > 0.0 ? s / x : 1.0, angle = omega * (at_s - middle_s);
+      turned_.real[m] = size * std::cos(angle);
+      turned_.imag[m] = size * std::sin(angle);
+      turn_.real[m] = c * c - s * s;
+      turn_.imag[m] = -2.0 * s * c;
     }
   }
   bool is_over() const { return next_ == force_->impulses_n_s.size(); }
   double calc_end_s() const { return force_->start_s + static_cast<double>(next_ + 1) * force_->step_s; }
-  /// Calls add(mode, change) for every mode.
+  /// Calls add(mode, change: real, imaginary) for every mode.
   template <class Add>
   void take(Add&& add) {
     const Vec3& impulse = force_->impulses_n_s[next_++];
-    for (std::size_t m = 0; m < turned_.size(); ++m) {
+    for (std::size_t m = 0; m < turn_.real.size(); ++m) {
       const double* phi = &force_->shape[3 * m];
-      add(m, (phi[0] * impulse[0] + phi[1] * impulse[1] + phi[2] * impulse[2]) * turned_[m]);
-      turned_[m] *= turn_[m];
+      const double given = phi[0] * impulse[0] + phi[1] * impulse[1] + phi[2] * impulse[2], real = turned_.real[m], imag = turned_.imag[m];
+      add(m, given * real, given * imag);
+      turned_.real[m] = real * turn_.real[m] - imag * turn_.imag[m];
+      turned_.imag[m] = real * turn_.imag[m] + imag * turn_.real[m];
     }
   }
 
@@ -50,15 +62,22 @@ std::size_t find_later(const ModalForce& force, double time_s) {
   return static_cast<std::size_t>(std::clamp(done, 0.0, static_cast<double>(force.impulses_n_s.size())));
 }
 
-/// Adds the pieces of a force from `first` on to the state at a time.
-void apply(const impact::Modes& modes, const ModalForce& force, double at_s, std::size_t first, double factor, ModalState& state) {
-  Pieces pieces(modes, force, at_s, first);
+/// Adds the pieces of a force, which are changes at its time, to a state.
+void add_pieces(const impact::Modes& modes, Pieces pieces, double factor, ModalState& state) {
   while (!pieces.is_over())
-    pieces.take([&](std::size_t m, std::complex<double> change) {
+    pieces.take([&](std::size_t m, double real, double imag) {
       const double omega = modes.get_omega()[m];
-      state.q_dot[m] += factor * change.real();
-      if (omega > 0.0) state.q[m] += factor * change.imag() / omega;
+      state.q_dot[m] += factor * real;
+      if (omega > 0.0) state.q[m] += factor * imag / omega;
     });
+}
+
+/// Pieces of the forces that are later than `at_s`, as changes at this time.
+std::vector<Pieces> list_later(const impact::Modes& modes, const std::vector<ModalForce>& forces, double at_s) {
+  std::vector<Pieces> later;
+  for (const ModalForce& force : forces)
+    if (const std::size_t first = find_later(force, at_s); first < force.impulses_n_s.size()) later.emplace_back(modes, force, at_s, first);
+  return later;
 }
 
 void turn_undamped(const impact::Modes& modes, ModalState& state, double time_s) {
@@ -83,14 +102,14 @@ const ModalState& Ringing::move_to(const impact::Modes& modes, double time_s) {
 
 ModalState Ringing::find_without_later(const impact::Modes& modes, double time_s) {
   ModalState state = move_to(modes, time_s);
-  for (const ModalForce& force : forces_) apply(modes, force, time_s, find_later(force, time_s), -1.0, state);
+  for (Pieces& pieces : list_later(modes, forces_, time_s)) add_pieces(modes, std::move(pieces), -1.0, state);
   return state;
 }
 
 void Ringing::add(const impact::Modes& modes, std::vector<ModalForce> forces) {
   state_.q.resize(modes.get_omega().size());
   state_.q_dot.resize(modes.get_omega().size());
-  for (const ModalForce& force : forces) apply(modes, force, time_s_, 0, 1.0, state_);
+  for (const ModalForce& force : forces) add_pieces(modes, {modes, force, time_s_, 0}, 1.0, state_);
   std::move(forces.begin(), forces.end(), std::back_inserter(forces_));
 }
 
@@ -134,41 +153,56 @@ double limit_further(std::span<const StruckBody> bodies, double factor, double d
     std::size_t body;
     bool is_further;
   };
-  std::vector<Course> courses(bodies.size());
+  std::vector<Course> courses;
   std::vector<Running> running;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const StruckBody& body = bodies[i];
-    if (body.modes == nullptr) continue;
-    const std::vector<double>& omega = body.modes->get_omega();
-    const ModalState state = body.ringing->find_without_later(*body.modes, start_s);
-    courses[i].further.resize(omega.size());
-    courses[i].earlier.resize(omega.size());
-    for (std::size_t m = 0; m < state.q.size(); ++m) courses[i].earlier[m] = {state.q_dot[m], omega[m] * state.q[m]};
-    for (const ModalForce& force : body.ringing->get_forces())
-      running.push_back({Pieces(*body.modes, force, start_s, find_later(force, start_s)), i, false});
+    const std::size_t n = body.modes != nullptr ? body.modes->get_omega().size() : 0;
+    courses.push_back({Amplitudes(n), Amplitudes(n)});
+    if (n == 0) continue;
+    ModalState state = body.ringing->move_to(*body.modes, start_s);
+    for (Pieces& pieces : list_later(*body.modes, body.ringing->get_forces(), start_s)) {
+      add_pieces(*body.modes, pieces, -1.0, state);
+      running.push_back({std::move(pieces), i, false});
+    }
+    for (std::size_t m = 0; m < state.q.size(); ++m) {
+      courses[i].earlier.real[m] = state.q_dot[m];
+      courses[i].earlier.imag[m] = body.modes->get_omega()[m] * state.q[m];
+    }
     for (const ModalForce& force : body.further) running.push_back({Pieces(*body.modes, force, start_s, 0), i, true});
   }
+  // The next pieces of all forces by their ends.
+  std::priority_queue<std::pair<double, std::size_t>, std::vector<std::pair<double, std::size_t>>, std::greater<>> next;
+  const auto push = [&](std::size_t k) {
+    if (!running[k].pieces.is_over()) next.emplace(running[k].pieces.calc_end_s(), k);
+  };
+  for (std::size_t k = 0; k < running.size(); ++k) push(k);
   double shared_j = 0.0, own_j = 0.0;
-  while (true) {
-    std::erase_if(running, [](const Running& r) { return r.pieces.is_over(); });
-    const auto next = std::min_element(running.begin(), running.end(),
-                                       [](const Running& x, const Running& y) { return x.pieces.calc_end_s() < y.pieces.calc_end_s(); });
-    if (next == running.end()) return factor;
-    const double now_s = next->pieces.calc_end_s();
-    Course& course = courses[next->body];
-    if (next->is_further)
-      next->pieces.take([&](std::size_t m, std::complex<double> change) {
-        own_j += std::real(std::conj(course.further[m] + 0.5 * change) * change);
-        shared_j += std::real(std::conj(course.earlier[m]) * change);
-        course.further[m] += change;
+  while (!next.empty()) {
+    const auto [now_s, k] = next.top();
+    next.pop();
+    auto& [pieces, body, is_further] = running[k];
+    Course& course = courses[body];
+    double shared = 0.0, own = 0.0;
+    if (is_further)
+      pieces.take([&](std::size_t m, double real, double imag) {
+        own += (course.further.real[m] + 0.5 * real) * real + (course.further.imag[m] + 0.5 * imag) * imag;
+        shared += course.earlier.real[m] * real + course.earlier.imag[m] * imag;
+        course.further.real[m] += real;
+        course.further.imag[m] += imag;
       });
     else
-      next->pieces.take([&](std::size_t m, std::complex<double> change) {
-        shared_j += std::real(std::conj(course.further[m]) * change);
-        course.earlier[m] += change;
+      pieces.take([&](std::size_t m, double real, double imag) {
+        shared += course.further.real[m] * real + course.further.imag[m] * imag;
+        course.earlier.real[m] += real;
+        course.earlier.imag[m] += imag;
       });
+    shared_j += shared;
+    own_j += own;
     factor = limit_factor(factor, shared_j, std::max(own_j, 0.0), now_s < end_s ? during_j : after_j);
+    push(k);
   }
+  return factor;
 }
 
 }  // namespace carillon::drive
