@@ -86,7 +86,8 @@ class HitSounds {
   std::vector<Ringing> ringing_;                // per body
   std::map<std::uint64_t, double> included_s_;  // by position: end of the last hit whose impact included it as a support,
   std::map<std::uint64_t, double> rattles_s_;   // and end of its rattling
-  int impacts_left_ = 0;
+  double work_left_ = 0.0;                      // for impacts with modes, in steps of an impact with one contact,
+  double worked_s_ = -1e9;                      // at this time
 };
 
 }  // namespace carillon::drive

@@ -26,7 +26,7 @@ struct TouchesOptions {
   bool points_after = false;  // points are of the poses after the step, otherwise of those before it
   bool compliant = false;     // a hit lasts many steps: it ends when its force has decayed
   bool early = false;         // hits are reported when they begin, with the impulse predicted from the restitution
-  int max_impacts = 8;        // integrated with modes, per step; further hits are limited Hertz pulses
+  int max_impacts = 8;        // mean impacts with modes at once; hits beyond their work are limited Hertz pulses (see hit_sounds.cpp)
   Vec3 gravity_m_s2{0.0, 0.0, -9.81};
   double slowest_m_s = 0.0;  // slower approaches are no hits; 0: 1 mm/s, or half of gravity times the step if that is more
   double longest_hit_s = 0.06;
@@ -78,7 +78,7 @@ struct TouchesCounters {
   std::int64_t dropped_points = 0;  // left out: more than max_points
   std::int64_t hits = 0;            // sounded
   std::int64_t impacts = 0;         // of them integrated with modes
-  std::int64_t simplified = 0;      // beyond max_impacts
+  std::int64_t simplified = 0;      // beyond the work of max_impacts
   std::int64_t limited = 0;         // pulses reduced to the energy of the blow
   std::int64_t masked = 0;          // hits left out: inaudible next to others
   std::int64_t weights = 0;         // impulses that were load only

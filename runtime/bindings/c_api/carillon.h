@@ -475,7 +475,8 @@ typedef struct carillon_touches_options {
   int32_t points_after; /* 0: points are of the poses before the step (Bullet, MuJoCo, PhysX, Jolt); 1: of those after it (Simbody) */
   int32_t compliant;    /* not 0: a hit lasts many steps (Simbody, MuJoCo): it ends when its force has decayed */
   int32_t early;        /* not 0: hits are reported when they begin, with the impulse predicted from the restitution */
-  int32_t max_impacts;  /* with modes, per step; further hits are Hertz pulses limited in energy, counted as `simplified` */
+  int32_t max_impacts;  /* limit of the work for impacts with modes: that of so many at once, and of 20 times as many per second. Further
+                           hits are Hertz pulses limited in energy, counted as `simplified` */
   double gravity_m_s2[3];
   double slowest_m_s;     /* slower approaches are no hits; 0: 1 mm/s, or half of gravity times the step if that is more */
   double longest_hit_s;   /* hits that last longer are ended, and counted as `cut` */
@@ -571,7 +572,7 @@ typedef struct carillon_touches_counters {
   int64_t dropped_points; /* left out: more than max_points */
   int64_t hits;           /* pulses and impacts that were sounded */
   int64_t impacts;        /* of them integrated with modes */
-  int64_t simplified;     /* beyond max_impacts: limited Hertz pulses */
+  int64_t simplified;     /* beyond the work of max_impacts: limited Hertz pulses */
   int64_t limited;        /* pulses reduced to the energy of the blow */
   int64_t masked;         /* hits left out: inaudible next to others */
   int64_t weights;        /* impulses that were load only */

@@ -53,6 +53,36 @@ TEST(TouchEnergy, BothEndsStrikeTogether) {
   }
 }
 
+TEST(TouchEnergy, ImpactsBeyondTheWorkOfMaxImpactsAreSimplified) {
+  constexpr int kPlates = 12;
+  const bank::Bank plate = physics::tests::make_plate_bank(0.2, 2e-3, 8000.0, 8, 1.0);
+  const double speed = 1.0, e = 0.5, impulse = (1.0 + e) * speed * plate.rigid.mass_kg;
+  for (const int most : {1, 4, 100}) {
+    Rig rig({.max_impacts = most, .ground_restitution = e});
+    for (int i = 0; i < kPlates; ++i) rig.add(plate, "plate" + std::to_string(i), {0.5 * i, 0, 1e-3}, {}, e);
+    rig.start();
+    const auto strike = [&](int count) {
+      std::vector<TouchPoint> points;
+      for (int i = 0; i < count; ++i) rig.poses[i].velocity_m_s[2] = -speed;
+      rig.step(1e-3, {});
+      for (int i = 0; i < count; ++i) {
+        rig.poses[i].velocity_m_s[2] = e * speed;
+        points.push_back(on_ground(i, {0.5 * i, 0.0, 0.0}, impulse));
+      }
+      rig.step(1e-3, points);
+      for (int n = 0; n < 40; ++n) rig.step(1e-3, {});
+    };
+    strike(kPlates);
+    const TouchesCounters first = rig.touches.get_counters();
+    EXPECT_EQ(first.impacts + first.simplified, kPlates) << most;
+    EXPECT_GE(first.impacts, 1) << most;
+    EXPECT_EQ(first.simplified == 0, most == 100) << most;
+    strike(1);  // as much again has become due
+    EXPECT_EQ(rig.touches.get_counters().impacts, first.impacts + 1) << most;
+    EXPECT_TRUE(rig.faults.empty());
+  }
+}
+
 TEST(TouchEnergy, BlowsOnARingingPlateAddNoMoreThanTheirOwn) {
   const double e = 0.5, speed = 1.0;
   for (const double thickness : {0.5e-3, 2e-3}) {
