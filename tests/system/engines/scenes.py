@@ -213,12 +213,12 @@ def render_own(programs, folder, name, many):
     return sounds
 
 
-def play(programs, folder, engine, name, hz, offset_m=0.0, seconds=None, way="given"):
+def play(programs, folder, engine, name, hz, offset_m=0.0, seconds=None, way="given", max_impacts=8):
     """Counters and sound of an engine's scene."""
     whole, bodies = SCENES[name]
     seconds, bodies = seconds or whole, move_bodies(bodies, offset_m)
     write_scene(folder / f"{name}.json", seconds, bodies)
-    words = [hz, seconds, "contacts.jsonl", "-", 8, way]
+    words = [hz, seconds, "contacts.jsonl", "-", max_impacts, way]
     output = run(programs / f"engine_{engine}", *words, cwd=folder, input=format_solids(bodies))
     return read_counters(output), render(programs, folder, name, "contacts.jsonl")
 
