@@ -201,13 +201,14 @@ void HitSounds::sound(const StepView& step, const std::vector<Contact>& contacts
                       std::vector<events::Event>& events) {
   const auto count = static_cast<int>(contacts.size());
   if (std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.needs_modes(); })) {
-    if (integrate(step, contacts, counters, events)) {
+    if (work_left_ > 0.0 && integrate(step, contacts, counters, events)) {
       counters.hits += count;
       for (const Contact& c : contacts)
         for (const int body : {c.hit.a, c.hit.b})
           if (body >= 0) (void)masks_.take(body, c.hit.touch_s, c.blow.impulse_n_s, c.blow.duration_s);
       return;
     }
+    if (!(work_left_ > 0.0)) counters.simplified += count;
   }
   for (const Contact& c : contacts) {
     Blow blow = c.blow;
@@ -441,14 +442,22 @@ void HitSounds::add_modal_forces(std::span<const Contact> contacts, std::span<co
   }
 }
 
+/// Integrates an impact as long as the work that is left allows. False: not long enough, and no work is left then.
+bool HitSounds::advance(impact::Impact& impact, std::size_t contacts, double hertz_s) {
+  const double work = calc_step_work(contacts), most_s = work_left_ / work * impact.get_step_length();
+  if (most_s < kShortestPulses * hertz_s) {
+    work_left_ = 0.0;
+    return false;
+  }
+  (void)impact.advance(std::min({kLongestImpactS, kLongestPulses * hertz_s, most_s}));
+  work_left_ -= work * impact.get_steps();
+  return true;
+}
+
 /// False if it cannot be integrated: nothing is appended. As in our own contact, supported bodies are struck together with their supports.
 bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits, TouchesCounters& counters,
                           std::vector<events::Event>& events) {
   const FinishedHit& first = hits.front().hit;
-  if (!(work_left_ > 0.0)) {
-    counters.simplified += std::ssize(hits);
-    return false;
-  }
   double touch_s = first.touch_s, hertz_s = 0.0, wanted = 0.0, blow_j = 0.0, most_j = 0.0;
   std::vector<const FinishedHit*> together;
   for (const Contact& c : hits) {
@@ -503,15 +512,7 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits
     impact.emplace(bodies, springs, impact::Options{.max_yielded_m = std::numeric_limits<double>::infinity()});
     bool closes = false;
     for (int i = 0; i < static_cast<int>(springs.size()); ++i) closes = closes || impact->calc_approach(i) > rigid::kMinImpactSpeedMS;
-    if (!closes) return false;
-    const double work = calc_step_work(contacts.size()), most_s = work_left_ / work * impact->get_step_length();
-    if (most_s < kShortestPulses * hertz_s) {
-      work_left_ = 0.0;
-      counters.simplified += std::ssize(hits);
-      return false;
-    }
-    (void)impact->advance(std::min({kLongestImpactS, kLongestPulses * hertz_s, most_s}));
-    work_left_ -= work * impact->get_steps();
+    if (!closes || !advance(*impact, contacts.size(), hertz_s)) return false;
   } catch (const std::invalid_argument&) {
     return false;
   }

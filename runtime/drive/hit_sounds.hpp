@@ -72,6 +72,7 @@ class HitSounds {
   std::vector<StruckBody> find_struck(const StepView& step, const Contact& contact);
   static std::vector<double> calc_rigid_pushes(const StepView& step, std::span<const FinishedHit* const> hits);
   static void join_predicted(const StepView& step, std::vector<FinishedHit>& hits);
+  bool advance(impact::Impact& impact, std::size_t contacts, double hertz_s);
   bool integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
   impact::Body make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s);
   static double keep_ringing(const impact::Impact& impact, std::vector<impact::Body> before, std::vector<StruckBody>& struck,
