@@ -31,7 +31,7 @@ constexpr double kLongestPulses = 50.0;    // an impact lasts at most this many 
 // Work of impacts with modes, in integration steps of an impact with one contact:
 constexpr double kWorkPerImpact = 250.0;  // mean of an impact; that of max_impacts may be spent at once,
 constexpr double kBurstsPerS = 20.0;      // 1/s; and as much again so often
-constexpr double kShortestPulses = 3.0;   // Hertz times; an impact for which the work does not last so long is a pulse
+constexpr double kShortestPulses = 3.0;   // Hertz times; minimum length of an impact
 constexpr double kRingingShare = 0.01;    // of the speed of approach: impacts on bodies that ring faster are integrated
 constexpr int kPulsePieces = 16;          // of a Hertz pulse, for its energy at every instant
 constexpr double kRattleShare = 0.1;      // of that speed where bodies rattle: slower hits are part of it
@@ -442,7 +442,7 @@ void HitSounds::add_modal_forces(std::span<const Contact> contacts, std::span<co
   }
 }
 
-/// Integrates an impact as long as the work that is left allows. False: not long enough, and no work is left then.
+/// Integrates an impact within the remaining work. False: below kShortestPulses; no work remains.
 bool HitSounds::advance(impact::Impact& impact, std::size_t contacts, double hertz_s) {
   const double work = calc_step_work(contacts), most_s = work_left_ / work * impact.get_step_length();
   if (most_s < kShortestPulses * hertz_s) {

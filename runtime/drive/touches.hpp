@@ -26,7 +26,7 @@ struct TouchesOptions {
   bool points_after = false;  // points are of the poses after the step, otherwise of those before it
   bool compliant = false;     // a hit lasts many steps: it ends when its force has decayed
   bool early = false;         // hits are reported when they begin, with the impulse predicted from the restitution
-  int max_impacts = 8;        // mean impacts with modes at once; hits beyond their work are limited Hertz pulses (see hit_sounds.cpp)
+  int max_impacts = 8;        // work limit, in mean impacts with modes at once; further hits: limited Hertz pulses
   Vec3 gravity_m_s2{0.0, 0.0, -9.81};
   double slowest_m_s = 0.0;  // slower approaches are no hits; 0: 1 mm/s, or half of gravity times the step if that is more
   double longest_hit_s = 0.06;

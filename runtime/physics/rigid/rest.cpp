@@ -77,8 +77,7 @@ void Rest::note_swings() {
   for (int i = 0; i < bodies_.count(); ++i) {
     if (!bodies_.moves(i)) continue;
     Pace& pace = paces_[i];
-    if (supports[i] == kMany) pace.leaned_s = now_s;
-    const bool swings = now_s - pace.leaned_s <= kSwingDelayS && bodies_.get_pull(i) == 0.0 && bodies_.find_articulation(i) == nullptr &&
+    const bool swings = supports[i] == kMany && bodies_.get_pull(i) == 0.0 && bodies_.find_articulation(i) == nullptr &&
                         calc_distance(bodies_.solid(i), bodies_.state(i), pace.swing) <= kSwingRatio * bodies_.solid(i).radius_m;
     if (!swings) {
       pace.swing = bodies_.state(i);

@@ -63,7 +63,6 @@ class Rest {
     double anchored_s = 0.0;    // since this time
     State swing;                // pose about which it swings,
     double swings_s = 0.0;      // since this time
-    double leaned_s = -1.0;     // last time on a moving body or two supports
   };
   enum class Balance { none, stands, leans };  // leans: only with the forces of others
 

@@ -25,7 +25,6 @@ KNOBS = {
     "early": (8, "early"),
     "impulses not given": (8, "found"),
 }
-STARTS = 12  # further ones of chaotic scenes, to each side
 
 
 def list_settings():
@@ -42,7 +41,7 @@ def play(lab, folder, name, hz, knob, own):
     counters, sound = again()
     (peak, centroid), (own_peak, own_centroid) = scenes.find_first_hit(sound), scenes.find_first_hit(own[0])
     windows = scenes.find_differences(sound, own[0])
-    for offset_m, other in zip(scenes.get_starts(name, STARTS), own[1:]):
+    for offset_m, other in zip(scenes.get_starts(name), own[1:]):
         windows += scenes.find_differences(again(offset_m, 0.5)[1], other)
     return {
         "first_db": float(20 * np.log10(peak / own_peak)),
@@ -63,7 +62,7 @@ def measure(lab, names):
         scenes.solve_banks(programs, folder)
     own, found = {}, {}
     for name in names:
-        own[name] = scenes.render_own(programs, folder, name, STARTS)
+        own[name] = scenes.render_own(programs, folder, name)
     cases = [(name, *setting) for name in names for setting in list_settings()]
     for number in range(lab.repeats):
         for case in cases if number % 2 == 0 else reversed(cases):
@@ -91,7 +90,7 @@ def study(lab, bodies):
     section.say(
         "Bodies fall in Bullet (`tests/system/engines/scenes.py`). The tracker makes contacts of its steps, and `carillon-render` plays"
         " them, against the same scene in our own physics. Error: median difference of the levels of windows of 125 ms above"
-        f" 60 dB(A) in the first half second, over starts up to 3 mm apart (tube and heap: {2 * STARTS + 1}, box: 3), and of the peak of"
+        f" 60 dB(A) in the first half second, over starts up to 3 mm apart ({', '.join(f'{SCENES[name]}: {1 + len(scenes.get_starts(name))}' for name in names)}), and of the peak of"
         " the first hit. A heap differs already by its motion. CPU is of the tracker."
     )
     for name in names:

@@ -9,15 +9,15 @@ import numpy as np
 FRICTION, RESTITUTION = 0.4, 0.5  # of every body
 IN_EFFECT = {"rod": 0.37}  # of engines: in our own contact modes take energy of the hits
 CHAOTIC = ("box", "tube", "two", "pile", "bar", "slap", "rod", "row", "bead", "drop")
-# Single bounces are chaotic: medians over a few starts move by 2 dB when a frequency changes by 1e-9, over 49 by 0.5 dB.
-VERY_CHAOTIC = ("tube", "rod", "pile", "row")
+# Further starts to each side, and their distance [m]. Single bounces are chaotic: medians of the pile and the rod over 13 starts move by 2 dB
+# when a frequency changes by 1e-9, over 49 by 0.5 dB.
+STARTS = {"tube": (2, 5e-4), "row": (6, 5e-4), "rod": (24, 1.25e-4), "pile": (24, 1.25e-4)}
 
 
-def get_starts(name, many):
-    """Offsets of the further starts of a scene [m]; `many`: of a very chaotic one to each side, within 3 mm."""
-    if name in VERY_CHAOTIC:
-        return tuple(sign * 0.003 * k / many for k in range(1, many + 1) for sign in (1, -1))
-    return (0.001, -0.001) if name in CHAOTIC else ()
+def get_starts(name):
+    """Offsets of the further starts of a scene [m]."""
+    count, apart_m = STARTS.get(name, (1, 1e-3)) if name in CHAOTIC else (0, 0.0)
+    return tuple(sign * apart_m * k for k in range(1, count + 1) for sign in (1, -1))
 
 
 BOX, BALL, TUBE = [0.06, 0.04, 0.025], [0.03, 0.03, 0.03], [0.075, 0.02, 0.02]
@@ -203,11 +203,11 @@ def move_bodies(bodies, offset_m):
     return [{**b, "position": tuple(x + offset_m * m for x, m in zip(b["position"], b["moved"]))} for b in bodies]
 
 
-def render_own(programs, folder, name, many):
-    """Sounds of a scene by our own contact: of its start, and of the further ones (get_starts)."""
+def render_own(programs, folder, name):
+    """Sounds of a scene by our own contact: of its start, and of the further ones."""
     seconds, bodies = SCENES[name]
     sounds = []
-    for offset_m in (0.0, *get_starts(name, many)):
+    for offset_m in (0.0, *get_starts(name)):
         write_scene(folder / f"{name}.json", 0.5 if sounds else seconds, move_bodies(bodies, offset_m))
         sounds.append(render(programs, folder, name))
     return sounds
@@ -260,7 +260,7 @@ def compare_ways(programs, folder, engine, name, hz):
     }
 
 
-def compare(programs, folder, engine, name, hz, own, many):
+def compare(programs, folder, engine, name, hz, own):
     """An engine's scene at a step against our own contact, whose sounds are `own` (render_own): counters, and differences of the first hit
     (level and centroid), the median of the windows of the first half second above 60 dB(A) of all starts, and that of all windows from
     0.25 s to 2 s; the level of the last 0.5 s; all levels."""
@@ -269,7 +269,7 @@ def compare(programs, folder, engine, name, hz, own, many):
     peak, centroid = find_first_hit(sound)
     own_peak, own_centroid = find_first_hit(own[0])
     windows = find_differences(sound, own[0])
-    for offset_m, other in zip(get_starts(name, many), own[1:]):
+    for offset_m, other in zip(get_starts(name), own[1:]):
         windows += find_differences(play(programs, folder, engine, name, hz, offset_m, 0.5)[1], other)
     return {
         **counters,

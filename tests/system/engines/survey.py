@@ -27,10 +27,10 @@ def main():
         else:
             scenes.solve_banks(programs, folder)
         for scene in options.scenes or list(scenes.SCENES):
-            own = scenes.render_own(programs, folder, scene, 6)
+            own = scenes.render_own(programs, folder, scene)
             print(f"{scene:5}  own   {' '.join(f'{x:4.0f}' for x in scenes.calc_levels(own[0]))}")
             for hz in options.hz:
-                r = scenes.compare(programs, folder, options.engine, scene, hz, own, 6)
+                r = scenes.compare(programs, folder, options.engine, scene, hz, own)
                 print(f"{'':5} {hz:5}  {' '.join(f'{x:4.0f}' for x in r['levels'])}")
                 print(
                     f"{'':12} first hit {r['first_db']:+.1f} dB, centroid {r['centroid_percent']:+.1f} %,"

@@ -243,7 +243,7 @@ TEST(Command, a_function_that_is_given_away_is_a_child_of_the_subreaper) {
   const auto begin = [] { return start({.words = {"work"}, .function = [] { return 7; }, .is_given_away = true}); };
   ASSERT_EQ(::prctl(PR_SET_CHILD_SUBREAPER, 1), 0);
   EXPECT_EQ(await_child(begin()), 7);
-  // A starter that is no subreaper gets no child.
+  // Starter without subreaper: no child.
   const pid_t between = start({.words = {"between"}, .function = [&] { return await_child(begin()) == -1 ? 5 : 1; }});
   EXPECT_EQ(await_child(between), 5);
   int status = 0;
