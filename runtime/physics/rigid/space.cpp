@@ -257,7 +257,19 @@ void Space::move(double to_s, double part_s) {
     bodies_.place(step_.body(n));
   }
   const double pulls_j = before.empty() ? 0.0 : give_pulls(before, in_impact, part_s);
-  if (!has_impacts) problem_.remove_gain(step_, before_j + loads_j + pulls_j);
+  if (!has_impacts) return problem_.remove_gain(step_, before_j + loads_j + pulls_j);
+  std::vector<int> struck;
+  for (int n = 0; n < step_.count(); ++n)
+    if (in_impact[n] != 0) struck.push_back(step_.body(n));
+  extend(struck);
+}
+
+/// Adds the pairs that come into reach of struck bodies to the present step; those with other islands wait for the next.
+void Space::extend(const std::vector<int>& struck) {
+  const std::size_t before = windows_.near().size();
+  for (const int body : struck) windows_.extend(body);
+  for (std::size_t n = before; n < windows_.near().size(); ++n)
+    if (step_.has(*windows_.near()[n])) step_.island().pairs.push_back(windows_.near()[n]);
 }
 
 /// Applies all current strikes, rigid or modal.
@@ -280,11 +292,7 @@ void Space::strike(const std::vector<ContactRef>& first) {
   strike.together_s = step_.together_s;
   modal_states_.excite(strike, lost_j);
   rest_.reset(strike.bodies);
-  // Pairs that come into reach are met in this step already; those with other islands wait for the next.
-  const std::size_t near = windows_.near().size();
-  for (const int body : strike.bodies) windows_.extend(body);
-  for (std::size_t n = near; n < windows_.near().size(); ++n)
-    if (step_.has(*windows_.near()[n])) step_.island().pairs.push_back(windows_.near()[n]);
+  extend(strike.bodies);
   keep_triangles(strike.hits);
 }
 

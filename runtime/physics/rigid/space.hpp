@@ -118,6 +118,7 @@ class Space {
   double give_pulls(const std::vector<State>& before, const std::vector<char>& in_impact, double part_s);
   void stir(int body);
   void strike(const std::vector<ContactRef>& first);
+  void extend(const std::vector<int>& struck);
 
   Options options_;
   Ledger ledger_;
