@@ -87,11 +87,12 @@ def study(lab, bodies):
     section = Section(NAME, TITLE, lab.make_command(NAME))
     names = QUICK_SCENES if lab.quick else tuple(SCENES)
     found = measure(lab, names)
+    starts = ", ".join(f"{SCENES[name]}: {1 + len(scenes.get_starts(name))}" for name in names)
     section.say(
         "Bodies fall in Bullet (`tests/system/engines/scenes.py`). The tracker makes contacts of its steps, and `carillon-render` plays"
         " them, against the same scene in our own physics. Error: median difference of the levels of windows of 125 ms above"
-        f" 60 dB(A) in the first half second, over starts up to 3 mm apart ({', '.join(f'{SCENES[name]}: {1 + len(scenes.get_starts(name))}' for name in names)}), and of the peak of"
-        " the first hit. A heap differs already by its motion. CPU is of the tracker."
+        f" 60 dB(A) in the first half second, over starts up to 3 mm apart ({starts}), and of the peak of the first hit."
+        " A heap differs already by its motion. CPU is of the tracker."
     )
     for name in names:
         section.conclude(describe(name, found))
