@@ -15,7 +15,7 @@ constexpr double kMaxImpactS = 0.5;           // s; and of all others
 constexpr double kMaxCorrectionRatio = 0.01;  // fraction of the kinetic energy: maximum correction per step of an impact on joints
 constexpr double kSamePlaceRatio = 0.05;      // of the size
 constexpr double kMinMoveRatio = 0.02;        // fraction of the size: minimum distance of a contact from its touch for an update
-constexpr int kMaxFollowed = 8;               // contacts per impact, including open ones
+constexpr int kMaxFollowed = 12;              // contacts per impact, including open ones
 constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
 constexpr double kFaceCosine = 0.99;          // minimum cosine between normals of one face,
 constexpr double kFlatnessRatio = 0.02;       // fraction of the size: maximum distance of corners from its plane
@@ -233,9 +233,8 @@ std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal,
   return springs;
 }
 
-void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches) {
-  const double reach_m =
-      2.0 * bodies_.calc_closing_speed(pair.a, pair.b) * length_s + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kMaxDepthM;
+void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double way_m, double length_s, TouchSets& touches) {
+  const double reach_m = 2.0 * way_m + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kMaxDepthM;
   const auto is_closed = [&](const ModalContact& contact) {
     return modal.impact->get_compression(static_cast<int>(&contact - modal.contacts.data())) > 0.0;
   };
@@ -283,15 +282,35 @@ void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches)
       if (const int body = modal.bodies[n++]; bodies_.has_modes(body)) note_swing(bodies_, body, b.q, b.q_dot);
     const auto is_in = [&](int body) { return std::find(modal.bodies.begin(), modal.bodies.end(), body) != modal.bodies.end(); };
     const auto may_join = [&](int body) { return is_in(body) || (!bodies_.moves(body) && !bodies_.has_modes(body)); };
+    std::vector<Pair*> pairs;
+    double fastest_m_s = 0.0;  // within the step the impact may pass it on to any of its pairs
     for (Pair* pair : step.island().pairs) {
       if (pair->cord >= 0 || !step.has(*pair) || !(is_in(pair->a) || is_in(pair->b))) continue;
       if (!may_join(pair->a) || !may_join(pair->b)) continue;
+      pairs.push_back(pair);
+      fastest_m_s = std::max(fastest_m_s, bodies_.calc_closing_speed(pair->a, pair->b));
+    }
+    for (Pair* pair : pairs) {
       part(*pair, touches);
-      touches.search(*pair, length_s);
+      touches.search(*pair, length_s, fastest_m_s);
       touches.complete_in_flight(*pair, length_s);
-      follow(modal, *pair, length_s, touches);
+      follow(modal, *pair, fastest_m_s * length_s, length_s, touches);
     }
   }
+}
+
+bool ModalImpacts::may_meet_others(const Step& step, double length_s) {
+  for (const Pair* pair : step.island().pairs) {
+    if (pair->cord >= 0 || pair->b < 0) continue;
+    for (const auto& [body, other] : {std::pair(pair->a, pair->b), std::pair(pair->b, pair->a)}) {
+      if (!bodies_.is_moved_by_impact(body) || find(body) == find(other)) continue;
+      double fastest_m_s = 0.0;
+      for (const int member : find(body)->bodies) fastest_m_s = std::max(fastest_m_s, bodies_.calc_speed(member));
+      const double reach_m = 2.0 * fastest_m_s * length_s + bodies_.get_swing(body) + bodies_.get_swing(other);
+      if (std::any_of(pair->contacts.begin(), pair->contacts.end(), [&](const Contact& c) { return c.touch.gap_m < reach_m; })) return true;
+    }
+  }
+  return false;
 }
 
 void ModalImpacts::advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches) {

@@ -68,6 +68,8 @@ class ModalImpacts {
   void follow(const Step& step, double length_s, TouchSets& touches);
   /// Begins impacts of ringing bodies before contact of their deformed surfaces in a step.
   void begin_early(const Step& step, double length_s, const Instants& instants);
+  /// True if a body moved by an impact may meet a body outside of it within a step.
+  bool may_meet_others(const Step& step, double length_s);
   /// Depth of a pair explained by springs and modes of its impact [m].
   double calc_depth(const Pair& pair) const;
   /// The same at a point of the pair [m].
@@ -97,7 +99,7 @@ class ModalImpacts {
   ModalImpact* find(int body);
   ModalImpact* find_own(const Step& step, const Hit& hit);
   std::optional<Selection> select(const Step& step, const Collision& collision, const Instants& instants);
-  void follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches);
+  void follow(ModalImpact& modal, Pair& pair, double way_m, double length_s, TouchSets& touches);
   void part(Pair& pair, const TouchSets& touches) const;
   ModalContact* find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const;
   void place(ModalContact& contact, bool is_closed, Contact& touch, const geometry::Touch& at);

@@ -99,30 +99,38 @@ void Space::open_window(double end_s) {
   windows_.choose_steps();
 }
 
+/// Depth from which the bodies of an island are moved apart [m].
+double Space::calc_open_depth(const Island& island) const {
+  const bool is_on_ground =
+      island.bodies.size() == 1 && std::all_of(island.pairs.begin(), island.pairs.end(), [](const Pair* pair) { return pair->b < 0; });
+  if (is_on_ground) return kDeepM;
+  const bool wobbles = std::any_of(island.bodies.begin(), island.bodies.end(),
+                                   [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlowSpeedMS; });
+  return wobbles ? kMaxDepthM - kMissingDepthM : kMaxDepthM;
+}
+
 void Space::step_island(Island& island, double start_s, double length_s) {
   pull_joints(island, length_s);
   step_.begin(island);
   double done = 0.0;
   int impacts = 0, missed = 0, more = 0;
   bool begun = false;
-  const bool wobbles = std::any_of(island.bodies.begin(), island.bodies.end(),
-                                   [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlowSpeedMS; });
-  const bool is_on_ground =
-      step_.count() == 1 && std::all_of(island.pairs.begin(), island.pairs.end(), [](const Pair* pair) { return pair->b < 0; });
-  const double open_m = is_on_ground ? kDeepM : wobbles ? kMaxDepthM - kMissingDepthM : kMaxDepthM;
+  const double open_m = calc_open_depth(island);
   const int max_impacts = std::clamp(kMaxStruckBodies / step_.count(), kMinImpacts, kMaxImpacts);
   if (instants_.is_crowded(island, start_s)) {
     strike_at_once(start_s, length_s);
     impacts = max_impacts;
   }
   while (length_s - done > kMinStepS) {
-    double h = impacts > 0 && !modal_impacts_.list().empty() ? std::min(length_s - done, kMaxStruckStepS) : length_s - done;
     bodies_.set_time(start_s + done);
+    double h = length_s - done;
+    if (!modal_impacts_.list().empty() && (impacts > 0 || modal_impacts_.may_meet_others(step_, h))) h = std::min(h, kMaxStruckStepS);
     modal_impacts_.begin_early(step_, h, instants_);
     modal_impacts_.end_where_touching(step_, touches_);
     const bool begins = !std::exchange(begun, true), may_sleep = begins && rest_.may_sleep(island.bodies, h);
     projection_.collect(step_);
     projection_.run(step_, open_m, h);
+    extend_in_impacts();
     modal_impacts_.follow(step_, h, touches_);
     if ((may_sleep && try_rest(island, h)) || (begins && rest_.try_still(island, h))) break;
     touches_.forget_closing(step_);
@@ -264,10 +272,23 @@ void Space::move(double to_s, double part_s) {
   extend(struck);
 }
 
-/// Adds the pairs that come into reach of struck bodies to the present step; those with other islands wait for the next.
-void Space::extend(const std::vector<int>& struck) {
+/// Before a part of a step: the fastest body of an impact may pass its speed on to the others.
+void Space::extend_in_impacts() {
+  std::vector<int> struck;
+  double fastest_m_s = 0.0;
+  for (const int body : step_.island().bodies) {
+    if (!bodies_.is_moved_by_impact(body)) continue;
+    struck.push_back(body);
+    fastest_m_s = std::max(fastest_m_s, bodies_.calc_speed(body));
+  }
+  extend(struck, fastest_m_s);
+}
+
+/// Adds the pairs that come into reach of struck bodies, at a speed of at least `least_m_s`, to the present step; those with other islands
+/// wait for the next.
+void Space::extend(const std::vector<int>& struck, double least_m_s) {
   const std::size_t before = windows_.near().size();
-  for (const int body : struck) windows_.extend(body);
+  for (const int body : struck) windows_.extend(body, least_m_s);
   for (std::size_t n = before; n < windows_.near().size(); ++n)
     if (step_.has(*windows_.near()[n])) step_.island().pairs.push_back(windows_.near()[n]);
 }

@@ -110,6 +110,7 @@ class Space {
 
  private:
   void open_window(double end_s);
+  double calc_open_depth(const Island& island) const;
   void step_island(Island& island, double start_s, double length_s);
   bool try_rest(Island& island, double length_s);
   bool strike_at_once(double start_s, double length_s);
@@ -118,7 +119,8 @@ class Space {
   double give_pulls(const std::vector<State>& before, const std::vector<char>& in_impact, double part_s);
   void stir(int body);
   void strike(const std::vector<ContactRef>& first);
-  void extend(const std::vector<int>& struck);
+  void extend_in_impacts();
+  void extend(const std::vector<int>& struck, double least_m_s = 0.0);
 
   Options options_;
   Ledger ledger_;

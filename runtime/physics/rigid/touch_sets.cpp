@@ -24,6 +24,7 @@ constexpr double kMergeRatio = 1e-4;         // fraction of the size: maximum di
 constexpr double kFarJumpRatio = 0.25;       // relative to the size: a touch that moves farther within a step is a different one
 constexpr double kJumpRad = 0.2;             // rad; rotation of the normal in the body by which a touch has jumped
 constexpr double kSagDecayS = 10e-3;         // s
+constexpr double kMinMissingSpeedMS = 0.1;   // m/s; slower polyhedra cannot miss touches
 constexpr int kMaxAdded = 4;                 // missing touches added at the end of a flight
 constexpr double kDeepRatio = 0.1;           // fraction of the thickness: bodies with deeper penetration are searched apart
 
@@ -79,10 +80,10 @@ void TouchSets::forget(int body) {
   std::erase_if(pairs_, [&](const auto& entry) { return entry.first.first == body || entry.first.second == body; });
 }
 
-void TouchSets::search(Pair& pair, double step_s) {
+void TouchSets::search(Pair& pair, double step_s, double least_m_s) {
   if (pair.cord >= 0) return refresh(pair);
   ++ledger_.costs.searches;
-  const double speed = bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s;
+  const double speed = std::max(bodies_.calc_closing_speed(pair.a, pair.b), least_m_s) + norm(bodies_.gravity()) * step_s;
   const double ahead_s =
       pair.b < 0 && !bodies_.is_flat(pair.a) ? std::min(kRollingMarginSteps * step_s, kMaxLookAheadS) : kMarginSteps * step_s;
   pair.margin_m = std::min(std::max(2e-4, ahead_s * speed), kSearchRangeRatio * bodies_.calc_size(pair.a, pair.b));
@@ -261,6 +262,7 @@ std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const geometry::Fr
 TouchSets::Ahead TouchSets::complete(Pair& pair, const geometry::Frame& a, const geometry::Frame& b, double closing_s) {
   const geometry::Shape& mine = *bodies_.get_shape(pair.a);
   const geometry::Shape* theirs = bodies_.get_shape(pair.b);
+  if (theirs != nullptr && mine.is_polyhedron() && theirs->is_polyhedron()) return complete_polyhedra(pair, a, b);
   geometry::Deepest deepest;
   if (theirs == nullptr) {
     if (calc_least_gap(pair, mine, a) >= -kMissingDepthM) return {};
@@ -283,24 +285,43 @@ TouchSets::Ahead TouchSets::complete(Pair& pair, const geometry::Frame& a, const
   return {closes, depth_m};
 }
 
+/// The same for two polyhedra, whose touches are complete only near the poses of their search: fast bodies may meet with other features.
+TouchSets::Ahead TouchSets::complete_polyhedra(Pair& pair, const geometry::Frame& a, const geometry::Frame& b) {
+  if (bodies_.calc_closing_speed(pair.a, pair.b) < kMinMissingSpeedMS) return {};
+  geometry::PairMemory memory;
+  memory.axis = pair.memory.axis;
+  geometry::find_touches(*bodies_.get_shape(pair.a), move(a, pair.apart_m), *bodies_.get_shape(pair.b), b, 0.0, memory, found_);
+  const auto deepest = std::min_element(found_.begin(), found_.end(), [](const auto& x, const auto& y) { return x.gap_m < y.gap_m; });
+  if (deepest == found_.end() || deepest->gap_m >= -kMissingDepthM) return {};
+  const double depth_m = -deepest->gap_m - calc_explained_depth(pair);
+  geometry::Touch touch = move(*deepest, -1.0 * pair.apart_m);
+  const bool is_missing = deepest->gap_m < std::min(find_least(pair, a, b).second, 0.0) - kMissingDepthM &&
+                          follow(pair, touch, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b));
+  if (is_missing) add(pair, touch);
+  return {is_missing, depth_m};
+}
+
 /// Adds the touch of a point at the current poses.
 void TouchSets::add(Pair& pair, const geometry::Deepest& deepest) {
   const geometry::Shape& mine = *bodies_.get_shape(pair.a);
   const geometry::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
+  add(pair, pair.b < 0
+                ? geometry::make_ground_touch(mine, a, bodies_.ground()->height_m, deepest.place)
+                : move(geometry::make_touch(mine, move(a, pair.apart_m), *bodies_.get_shape(pair.b), b, deepest), -1.0 * pair.apart_m));
+}
+
+void TouchSets::add(Pair& pair, const geometry::Touch& touch) {
   pair.ahead.touches.clear();
+  const auto same = std::find_if(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) { return c.touch.id == touch.id; });
+  if (same != pair.contacts.end()) {  // it has moved away from its point
+    same->touch = touch;
+    return;
+  }
   Contact added;
   added.a = pair.a;
   added.b = pair.b;
-  added.touch = pair.b < 0
-                    ? geometry::make_ground_touch(mine, a, bodies_.ground()->height_m, deepest.place)
-                    : move(geometry::make_touch(mine, move(a, pair.apart_m), *bodies_.get_shape(pair.b), b, deepest), -1.0 * pair.apart_m);
-  const auto same =
-      std::find_if(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) { return c.touch.id == added.touch.id; });
-  if (same != pair.contacts.end()) {  // it has moved away from its point
-    same->touch = added.touch;
-    return;
-  }
-  added.presses = impacts_.is_pressed(pair, added.touch.where_m);
+  added.touch = touch;
+  added.presses = impacts_.is_pressed(pair, touch.where_m);
   pair.contacts.push_back(added);
 }
 

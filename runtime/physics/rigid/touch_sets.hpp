@@ -35,8 +35,8 @@ class TouchSets {
   /// Removes the pairs of a body.
   void forget(int body);
 
-  /// Searches the touches at the current poses.
-  void search(Pair& pair, double step_s);
+  /// Searches the touches at the current poses, for an approach of at least `least_m_s`.
+  void search(Pair& pair, double step_s, double least_m_s = 0.0);
   /// Moves the touches with the bodies. Touches off their surfaces are dropped, and the pair is searched at its next update. Records the
   /// largest changes of persistent curved touches: of the gap, of the position on body a, and of the normal in it.
   void refresh(Pair& pair) const;
@@ -87,8 +87,10 @@ class TouchSets {
   void limit_apart(Pair& pair) const;
   std::pair<Contact*, double> find_least(Pair& pair, const geometry::Frame& a, const geometry::Frame& b) const;
   Ahead complete(Pair& pair, const geometry::Frame& a, const geometry::Frame& b, double closing_s);
+  Ahead complete_polyhedra(Pair& pair, const geometry::Frame& a, const geometry::Frame& b);
   geometry::Frame find_flown(int body, double time_s) const;
   void add(Pair& pair, const geometry::Deepest& deepest);
+  void add(Pair& pair, const geometry::Touch& touch);
 
   const Bodies& bodies_;
   const ModalImpacts& impacts_;

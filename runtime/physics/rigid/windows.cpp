@@ -362,14 +362,14 @@ void Windows::undo_flight(int body, int by) {
   bodies_.place(body);
 }
 
-void Windows::extend(int body) {
+void Windows::extend(int body, double least_m_s) {
   bodies_.note_struck(body);
   const double left = end_s_ - bodies_.get_time();
   const double others_left = end_s_ - get_time();  // remaining time of islands that have not been stepped
-  const double speed = bodies_.calc_speed(body) + norm(bodies_.gravity()) * left;
+  const double speed = std::max(bodies_.calc_speed(body), least_m_s) + norm(bodies_.gravity()) * left;
   if (speed <= reach_m_s_[body]) return;
   reach_m_s_[body] = speed;
-  const geometry::Box box = bodies_.calc_box(body, speed * left + kBoxMarginM);
+  const geometry::Box box = bodies_.calc_box(body, speed * left + bodies_.get_swing(body) + kBoxMarginM);
   if (bodies_.ground() && box.low[2] < bodies_.ground()->height_m) add(body, -1);
   for (int j = 0; j < bodies_.count(); ++j) {
     if (j == body || bodies_.is_absent(j)) continue;

@@ -65,8 +65,8 @@ class Windows {
 
   /// A woken body takes the steps of the one that wakes it, which is due: so they do not depend on other islands.
   void wake(int body, int by);
-  /// Adds the pairs that a body may reach after an impact beyond its planned speed.
-  void extend(int body);
+  /// Adds the pairs that a body may reach after an impact beyond its planned speed, or at a speed of at least `least_m_s`.
+  void extend(int body, double least_m_s);
 
  private:
   /// A body that may roll alone, on smooth persistent touches.

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <map>
+#include <numbers>
 #include <random>
 #include <string>
 #include <utility>
@@ -101,6 +104,79 @@ TEST(drops, depth_of_bodies_struck_above_the_floor) {
     EXPECT_LE(space.calc_books().lifted_j, kWanted.lifted * kinetic_j);
   }
   EXPECT_GT(struck, 550);
+}
+
+/// Overlap of two boxes by the separating axis theorem: S. Gottschalk, M. Lin and D. Manocha (SIGGRAPH 1996). Negative: they are apart.
+double calc_overlap(const Space& space, const std::array<Vec3, 2>& sizes_m) {
+  std::array<Mat3, 2> axes;  // rows
+  for (int k : {0, 1}) axes[k] = transpose(make_rotation(space.state(k).rotation));
+  const Vec3 between = space.state(1).centre - space.state(0).centre;
+  double least_m = 1.0;
+  const auto test = [&](const Vec3& n) {
+    double overlap_m = -std::abs(dot(n, between));
+    for (int k : {0, 1})
+      for (int i = 0; i < 3; ++i) overlap_m += 0.5 * sizes_m[k][i] * std::abs(dot(n, axes[k][i]));
+    least_m = std::min(least_m, overlap_m);
+  };
+  for (int i = 0; i < 3; ++i) {
+    test(axes[0][i]);
+    test(axes[1][i]);
+    for (int j = 0; j < 3; ++j)
+      if (const Vec3 n = cross(axes[0][i], axes[1][j]); norm(n) > 1e-6) test((1.0 / norm(n)) * n);
+  }
+  return least_m;
+}
+
+// Plates, bars and cubes that turn fast meet in flight with features that no search has found: of these 500 pairs 17 were deeper than 50
+// um, one 2.1 mm, before polyhedra were compared at the end of a step.
+TEST(drops, depth_of_boxes_that_meet_in_flight) {
+  std::mt19937 random(11);
+  const auto draw = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  const auto draw_direction = [&] {
+    std::normal_distribution<double> normal;
+    const Vec3 x{normal(random), normal(random), normal(random)};
+    return (1.0 / norm(x)) * x;
+  };
+  const Vec3 kinds_m[] = {{0.1, 0.1, 0.003}, {0.04, 0.04, 0.002}, {0.1, 0.02, 0.01}, {0.03, 0.03, 0.03}};
+  int struck = 0;
+  for (int n = 0; n < 500; ++n) {
+    std::vector<Solid> solids;
+    std::vector<State> states;
+    const std::array<Vec3, 2> sizes_m{kinds_m[n % 4], kinds_m[n / 4 % 4]};
+    for (const Vec3& size_m : sizes_m) {
+      Solid& s = solids.emplace_back();
+      s.shape = geometry::tests::make_box(size_m, 1).make();
+      s.mass_kg = 2000.0 * size_m[0] * size_m[1] * size_m[2];
+      for (int i = 0; i < 3; ++i) s.inertia_kg_m2[i][i] = s.mass_kg / 12.0 * (dot(size_m, size_m) - size_m[i] * size_m[i]);
+      for (int i = 0; i < 3; ++i) s.inverse_inertia[i][i] = 1.0 / s.inertia_kg_m2[i][i];
+      s.radius_m = 0.5 * norm(size_m);
+      s.young_modulus_pa = 2e11;
+      s.poisson_ratio = 0.3;
+      s.restitution = draw(0.0, 0.9);
+      s.friction = draw(0.1, 1.0);
+      State& at = states.emplace_back();
+      const Vec3 axis = draw_direction();
+      const double half = 0.5 * draw(0.0, 2.0 * std::numbers::pi);
+      at.rotation = {std::cos(half), std::sin(half) * axis[0], std::sin(half) * axis[1], std::sin(half) * axis[2]};
+      const Mat3 rotation = make_rotation(at.rotation);
+      at.momentum = rotation * (s.inertia_kg_m2 * (transpose(rotation) * (draw(0.0, 200.0) * draw_direction())));
+      if (solids.size() == 1) continue;
+      const Vec3 from = draw_direction();
+      at.centre = (solids[0].radius_m + s.radius_m + 1e-3) * from;
+      at.velocity = -draw(0.2, 4.0) * from;
+    }
+    Space space(std::move(solids), std::move(states), std::nullopt, {}, {});
+    const double before_j = space.calc_books().motion_j;
+    double deepest_m = 0.0;
+    while (space.get_time() < 0.08 - 1e-9) {
+      space.step(0.08);
+      deepest_m = std::max(deepest_m, calc_overlap(space, sizes_m));
+    }
+    struck += space.take_strikes().empty() ? 0 : 1;
+    EXPECT_LE(deepest_m, 5e-5) << n;
+    EXPECT_LE(space.calc_books().motion_j, (1.0 + 1e-6) * before_j) << n;
+  }
+  EXPECT_GT(struck, 450);
 }
 
 // A cup and a bowl in a bowl that is fixed. Oracle: they fall no higher than they were, so that nothing lifts them. With touches that a

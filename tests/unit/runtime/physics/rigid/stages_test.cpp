@@ -406,7 +406,7 @@ TEST(windows, flights_and_independent_steps) {
   // An impact that throws the slow one towards the one that flies takes its flight back.
   stages.bodies.state(1).velocity = {-600, 0, 600};
   stages.bodies.place(1);
-  stages.windows.extend(1);
+  stages.windows.extend(1, 0.0);
   EXPECT_LT(stages.bodies.state(0).centre[0], t);
   EXPECT_EQ(near.size(), 4u);
 }
