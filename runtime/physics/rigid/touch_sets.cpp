@@ -228,6 +228,7 @@ void TouchSets::update(Pair& pair, double step_s) {
   else if (!pair.contacts.empty() && (pair.travelled_m > 0.0)) {
     refresh(pair);
     merge(pair);
+    if (!pair.searched) search(pair, step_s);  // a touch was lost
   }
   if (pair.travelled_m > 0.0) {
     remove_false(pair);

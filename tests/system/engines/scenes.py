@@ -11,7 +11,7 @@ IN_EFFECT = {"rod": 0.37}  # of engines: in our own contact modes take energy of
 CHAOTIC = ("box", "tube", "two", "pile", "bar", "slap", "rod", "row", "bead", "drop")
 # Further starts to each side, and their distance [m]. Single bounces are chaotic: a frequency changed by 1e-9 moves medians of the pile
 # and the rod by 2 dB over 13 starts, by 0.5 dB over 49.
-STARTS = {"tube": (6, 5e-4), "row": (6, 5e-4), "rod": (24, 1.25e-4), "pile": (24, 1.25e-4)}
+STARTS = {"tube": (6, 5e-4), "row": (6, 5e-4), "bead": (6, 5e-4), "rod": (24, 1.25e-4), "pile": (24, 1.25e-4)}
 
 
 def get_starts(name):
