@@ -29,7 +29,8 @@ constexpr double kMinImpactSpeed = 5e-3;   // m/s; slower hits are not integrate
 constexpr double kLongestImpactS = 20e-3;  // s
 constexpr double kLongestPulses = 50.0;    // an impact lasts at most this many Hertz times, for the sake of its cost,
 // Work of impacts with modes, in integration steps of an impact with one contact:
-constexpr double kWorkPerImpact = 250.0;  // mean of an impact; that of max_impacts may be spent at once,
+constexpr double kWorkPerImpact = 200.0;  // mean of an impact; that of max_impacts may be spent at once,
+constexpr double kMaxDebt = 200.0;        // by which the last impact may exceed it, so that it ends by itself
 constexpr double kBurstsPerS = 20.0;      // 1/s; and as much again so often
 constexpr double kShortestPulses = 3.0;   // Hertz times; minimum length of an impact
 constexpr double kRingingShare = 0.01;    // of the speed of approach: impacts on bodies that ring faster are integrated
@@ -444,7 +445,7 @@ void HitSounds::add_modal_forces(std::span<const Contact> contacts, std::span<co
 
 /// Integrates an impact within the remaining work. False: below kShortestPulses; no work remains.
 bool HitSounds::advance(impact::Impact& impact, std::size_t contacts, double hertz_s) {
-  const double work = calc_step_work(contacts), most_s = work_left_ / work * impact.get_step_length();
+  const double work = calc_step_work(contacts), most_s = (work_left_ + kMaxDebt) / work * impact.get_step_length();
   if (most_s < kShortestPulses * hertz_s) {
     work_left_ = 0.0;
     return false;

@@ -77,7 +77,7 @@ TEST(TouchEnergy, ImpactsBeyondTheWorkOfMaxImpactsAreSimplified) {
     EXPECT_EQ(first.impacts + first.simplified, kPlates) << most;
     EXPECT_GE(first.impacts, 1) << most;
     EXPECT_EQ(first.simplified == 0, most == 100) << most;
-    int whole = 0;  // impacts that passed on the engine's impulse, also those that the work has cut short
+    int whole = 0;  // impacts that passed on the impulse of the engine
     for (int i = 0; i < kPlates; ++i) {
       EXPECT_LE(rig.sum_impulses(i)[2], 1.001 * impulse) << most;
       if (rig.sum_impulses(i)[2] > 0.98 * impulse) ++whole;
