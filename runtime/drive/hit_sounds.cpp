@@ -30,8 +30,8 @@ constexpr double kLongestImpactS = 20e-3;  // s
 constexpr double kLongestPulses = 50.0;    // an impact lasts at most this many Hertz times, for the sake of its cost,
 // Work of impacts with modes, in integration steps of an impact with one contact:
 constexpr double kWorkPerImpact = 200.0;  // mean of an impact; that of max_impacts may be spent at once,
-constexpr double kMaxDebt = 200.0;        // by which the last impact may exceed it, so that it ends by itself
-constexpr double kBurstsPerS = 20.0;      // 1/s; and as much again so often
+constexpr double kBurstsPerS = 20.0;      // 1/s; and as much again so often;
+constexpr double kMaxDebt = 200.0;        // the last impact may exceed it by this
 constexpr double kShortestPulses = 3.0;   // Hertz times; minimum length of an impact
 constexpr double kRingingShare = 0.01;    // of the speed of approach: impacts on bodies that ring faster are integrated
 constexpr int kPulsePieces = 16;          // of a Hertz pulse, for its energy at every instant

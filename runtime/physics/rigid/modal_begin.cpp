@@ -14,7 +14,7 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr int kMaxHits = 8;                // per impact
+constexpr int kMaxHits = 8;                // per impact, with its compressed contacts
 constexpr double kMinEarlySpeedMS = 1e-2;  // m/s; minimum approach for an impact before contact of the rigid surfaces
 constexpr int kMaxContacts = 12;           // including resting contacts
 
@@ -189,7 +189,9 @@ bool ModalImpacts::join(const std::vector<Hit>& hits, Selection& selection, Touc
         end(*found, touches);  // the energy of its springs is lost
     }
   const bool leans = std::any_of(order.begin(), order.end(), [&](int n) { return selection.rests[n] != 0; });
-  const auto together = order.size() + (joined != nullptr ? joined->contacts.size() : 0);
+  auto together = order.size();
+  for (int k = 0; joined != nullptr && k < static_cast<int>(joined->contacts.size()); ++k)
+    together += joined->impact->get_compression(k) > 0.0 ? 1 : 0;
   if (leans) return together <= kMaxContacts;
   if (together <= kMaxHits) return true;
   if (joined != nullptr) end(*std::exchange(joined, nullptr), touches);

@@ -281,12 +281,11 @@ void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches)
     for (int n = 0; const impact::Body& b : modal.impact->get_bodies())
       if (const int body = modal.bodies[n++]; bodies_.has_modes(body)) note_swing(bodies_, body, b.q, b.q_dot);
     const auto is_in = [&](int body) { return std::find(modal.bodies.begin(), modal.bodies.end(), body) != modal.bodies.end(); };
-    const auto may_join = [&](int body) { return is_in(body) || (!bodies_.moves(body) && !bodies_.has_modes(body)); };
     std::vector<Pair*> pairs;
-    double fastest_m_s = 0.0;  // within the step the impact may pass it on to any of its pairs
+    double fastest_m_s = 0.0;  // the impact may pass this speed to any of its bodies
     for (Pair* pair : step.island().pairs) {
       if (pair->cord >= 0 || !step.has(*pair) || !(is_in(pair->a) || is_in(pair->b))) continue;
-      if (!may_join(pair->a) || !may_join(pair->b)) continue;
+      if (!may_join(is_in(pair->a), pair->a) || !may_join(is_in(pair->b), pair->b)) continue;
       pairs.push_back(pair);
       fastest_m_s = std::max(fastest_m_s, bodies_.calc_closing_speed(pair->a, pair->b));
     }
@@ -299,13 +298,17 @@ void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches)
   }
 }
 
-bool ModalImpacts::may_meet_others(const Step& step, double length_s) {
-  for (const Pair* pair : step.island().pairs) {
+bool ModalImpacts::may_meet_others(const Step& step, double length_s, TouchSets& touches) {
+  for (Pair* pair : step.island().pairs) {
     if (pair->cord >= 0 || pair->b < 0) continue;
     for (const auto& [body, other] : {std::pair(pair->a, pair->b), std::pair(pair->b, pair->a)}) {
-      if (!bodies_.is_moved_by_impact(body) || find(body) == find(other)) continue;
+      if (!bodies_.is_moved_by_impact(body)) continue;
+      const std::vector<int>& members = find(body)->bodies;
+      const auto is_in = [&](int i) { return std::find(members.begin(), members.end(), i) != members.end(); };
+      if (is_in(body) && may_join(is_in(other), other)) continue;
       double fastest_m_s = 0.0;
-      for (const int member : find(body)->bodies) fastest_m_s = std::max(fastest_m_s, bodies_.calc_speed(member));
+      for (const int member : members) fastest_m_s = std::max(fastest_m_s, bodies_.calc_speed(member));
+      touches.search(*pair, length_s, 2.0 * fastest_m_s);
       const double reach_m = 2.0 * fastest_m_s * length_s + bodies_.get_swing(body) + bodies_.get_swing(other);
       if (std::any_of(pair->contacts.begin(), pair->contacts.end(), [&](const Contact& c) { return c.touch.gap_m < reach_m; })) return true;
     }

@@ -69,7 +69,7 @@ class ModalImpacts {
   /// Begins impacts of ringing bodies before contact of their deformed surfaces in a step.
   void begin_early(const Step& step, double length_s, const Instants& instants);
   /// True if a body moved by an impact may meet a body outside of it within a step.
-  bool may_meet_others(const Step& step, double length_s);
+  bool may_meet_others(const Step& step, double length_s, TouchSets& touches);
   /// Depth of a pair explained by springs and modes of its impact [m].
   double calc_depth(const Pair& pair) const;
   /// The same at a point of the pair [m].
@@ -96,6 +96,8 @@ class ModalImpacts {
     std::list<std::vector<double>> shapes;  // of the contacts
   };
 
+  /// True if contacts of a body can belong to an impact, as it does itself or has neither motion nor modes.
+  bool may_join(bool is_in, int body) const { return is_in || (!bodies_.moves(body) && !bodies_.has_modes(body)); }
   ModalImpact* find(int body);
   ModalImpact* find_own(const Step& step, const Hit& hit);
   std::optional<Selection> select(const Step& step, const Collision& collision, const Instants& instants);

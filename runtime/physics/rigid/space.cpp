@@ -109,6 +109,19 @@ double Space::calc_open_depth(const Island& island) const {
   return wobbles ? kMaxDepthM - kMissingDepthM : kMaxDepthM;
 }
 
+/// Prepares the impacts with modes and the touches of a part of a step, at most `left_s` long; returns its length.
+double Space::begin_part(double left_s, double open_m, bool has_struck) {
+  double h = has_struck && !modal_impacts_.list().empty() ? std::min(left_s, kMaxStruckStepS) : left_s;
+  modal_impacts_.begin_early(step_, h, instants_);
+  modal_impacts_.end_where_touching(step_, touches_);
+  extend_in_impacts();
+  if (h > kMaxStruckStepS && modal_impacts_.may_meet_others(step_, h, touches_)) h = kMaxStruckStepS;
+  projection_.collect(step_);
+  projection_.run(step_, open_m, h);
+  modal_impacts_.follow(step_, h, touches_);
+  return h;
+}
+
 void Space::step_island(Island& island, double start_s, double length_s) {
   pull_joints(island, length_s);
   step_.begin(island);
@@ -123,15 +136,8 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   }
   while (length_s - done > kMinStepS) {
     bodies_.set_time(start_s + done);
-    double h = length_s - done;
-    if (!modal_impacts_.list().empty() && (impacts > 0 || modal_impacts_.may_meet_others(step_, h))) h = std::min(h, kMaxStruckStepS);
-    modal_impacts_.begin_early(step_, h, instants_);
-    modal_impacts_.end_where_touching(step_, touches_);
-    const bool begins = !std::exchange(begun, true), may_sleep = begins && rest_.may_sleep(island.bodies, h);
-    projection_.collect(step_);
-    projection_.run(step_, open_m, h);
-    extend_in_impacts();
-    modal_impacts_.follow(step_, h, touches_);
+    const bool begins = !std::exchange(begun, true), may_sleep = begins && rest_.may_sleep(island.bodies, length_s - done);
+    double h = begin_part(length_s - done, open_m, impacts > 0);
     if ((may_sleep && try_rest(island, h)) || (begins && rest_.try_still(island, h))) break;
     touches_.forget_closing(step_);
     double depth_m = 0.0;     // at the end of the step
@@ -272,7 +278,7 @@ void Space::move(double to_s, double part_s) {
   extend(struck);
 }
 
-/// Before a part of a step: the fastest body of an impact may pass its speed on to the others.
+/// Adds the pairs that bodies in impacts reach at twice the fastest speed of an impact: a heavy body may pass it to a light one.
 void Space::extend_in_impacts() {
   std::vector<int> struck;
   double fastest_m_s = 0.0;
@@ -281,7 +287,7 @@ void Space::extend_in_impacts() {
     struck.push_back(body);
     fastest_m_s = std::max(fastest_m_s, bodies_.calc_speed(body));
   }
-  extend(struck, fastest_m_s);
+  extend(struck, 2.0 * fastest_m_s);
 }
 
 /// Adds the pairs that come into reach of struck bodies, at a speed of at least `least_m_s`, to the present step; those with other islands

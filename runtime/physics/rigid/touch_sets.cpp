@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "runtime/physics/rigid/cords.hpp"
@@ -24,7 +25,7 @@ constexpr double kMergeRatio = 1e-4;         // fraction of the size: maximum di
 constexpr double kFarJumpRatio = 0.25;       // relative to the size: a touch that moves farther within a step is a different one
 constexpr double kJumpRad = 0.2;             // rad; rotation of the normal in the body by which a touch has jumped
 constexpr double kSagDecayS = 10e-3;         // s
-constexpr double kMinMissingSpeedMS = 0.1;   // m/s; slower polyhedra cannot miss touches
+constexpr double kMinMissingSpeedMS = 0.1;   // m/s; slower polyhedra miss touches by less than the margin of a search
 constexpr int kMaxAdded = 4;                 // missing touches added at the end of a flight
 constexpr double kDeepRatio = 0.1;           // fraction of the thickness: bodies with deeper penetration are searched apart
 
@@ -120,9 +121,10 @@ void TouchSets::search(Pair& pair, double step_s, double least_m_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
-  if (pair.b < 0 || !bodies_.is_flat(pair.a) || !bodies_.is_flat(pair.b)) keep_lost(pair, old);  // touch sets of polyhedra are complete
+  const bool is_complete = pair.b >= 0 && bodies_.is_flat(pair.a) && bodies_.is_flat(pair.b);  // of polyhedra
+  if (!is_complete) keep_lost(pair, old);
   remove_false(pair);
-  complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
+  if (!is_complete) complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
 /// Keeps touches that a search has lost. Between two bodies: those that touched and are within kDeepM. With the ground: closed load-bearing
@@ -225,14 +227,14 @@ void TouchSets::update(Pair& pair, double step_s) {
   if (pair.cord >= 0) return refresh(pair);
   if (!pair.searched || pair.travelled_m + calc_way(pair, step_s, step_s) > pair.margin_m)
     search(pair, step_s);
-  else if (!pair.contacts.empty() && (pair.travelled_m > 0.0)) {
+  else if (pair.travelled_m > 0.0) {
     refresh(pair);
     merge(pair);
-    if (!pair.searched) search(pair, step_s);  // a touch was lost
-  }
-  if (pair.travelled_m > 0.0) {
     remove_false(pair);
-    complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
+    if (!pair.searched)  // a touch was lost
+      search(pair, step_s);
+    else
+      complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
   }
   if (!(pair.sag_m > 0.0)) return;
   double deepest = 0.0;
@@ -289,17 +291,28 @@ TouchSets::Ahead TouchSets::complete(Pair& pair, const geometry::Frame& a, const
 /// The same for two polyhedra, whose touches are complete only near the poses of their search: fast bodies may meet with other features.
 TouchSets::Ahead TouchSets::complete_polyhedra(Pair& pair, const geometry::Frame& a, const geometry::Frame& b) {
   if (bodies_.calc_closing_speed(pair.a, pair.b) < kMinMissingSpeedMS) return {};
+  std::optional<geometry::Touch> touch = find_deepest(pair, a, b);
+  if (!touch || touch->gap_m >= -kMissingDepthM) return {};
+  const double depth_m = -touch->gap_m - (pair.apart_m == Vec3{} ? calc_explained_depth(pair) : 0.0);
+  if (touch->gap_m >= std::min(find_least(pair, a, b).second, 0.0) - kMissingDepthM) return {false, depth_m};
+  const geometry::Frame now_a = bodies_.get_frame(pair.a), now_b = bodies_.get_frame(pair.b);
+  *touch = move(*touch, -1.0 * pair.apart_m);
+  if (!follow(pair, *touch, now_a, now_b)) return {false, depth_m};
+  if (touch->gap_m < -kMaxDepthM) {  // if the bodies are not yet as deep, it is past an edge of its facet
+    const std::optional<geometry::Touch> now = find_deepest(pair, now_a, now_b);
+    if (!now || now->gap_m >= -kMaxDepthM) return {false, depth_m};
+  }
+  add(pair, *touch);
+  return {true, depth_m};
+}
+
+/// Deepest touch of two polyhedra at the frames `a` and `b`, with the bodies apart.
+std::optional<geometry::Touch> TouchSets::find_deepest(const Pair& pair, const geometry::Frame& a, const geometry::Frame& b) {
   geometry::PairMemory memory;
   memory.axis = pair.memory.axis;
   geometry::find_touches(*bodies_.get_shape(pair.a), move(a, pair.apart_m), *bodies_.get_shape(pair.b), b, 0.0, memory, found_);
   const auto deepest = std::min_element(found_.begin(), found_.end(), [](const auto& x, const auto& y) { return x.gap_m < y.gap_m; });
-  if (deepest == found_.end() || deepest->gap_m >= -kMissingDepthM) return {};
-  const double depth_m = -deepest->gap_m - calc_explained_depth(pair);
-  geometry::Touch touch = move(*deepest, -1.0 * pair.apart_m);
-  const bool is_missing = deepest->gap_m < std::min(find_least(pair, a, b).second, 0.0) - kMissingDepthM &&
-                          follow(pair, touch, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b));
-  if (is_missing) add(pair, touch);
-  return {is_missing, depth_m};
+  return deepest == found_.end() ? std::nullopt : std::optional(*deepest);
 }
 
 /// Adds the touch of a point at the current poses.
@@ -315,6 +328,7 @@ void TouchSets::add(Pair& pair, const geometry::Touch& touch) {
   pair.ahead.touches.clear();
   const auto same = std::find_if(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) { return c.touch.id == touch.id; });
   if (same != pair.contacts.end()) {  // it has moved away from its point
+    same->touching = same->touching && dot(same->touch.normal, touch.normal) > std::cos(kJumpRad);
     same->touch = touch;
     return;
   }

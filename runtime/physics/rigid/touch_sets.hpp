@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -88,6 +89,7 @@ class TouchSets {
   std::pair<Contact*, double> find_least(Pair& pair, const geometry::Frame& a, const geometry::Frame& b) const;
   Ahead complete(Pair& pair, const geometry::Frame& a, const geometry::Frame& b, double closing_s);
   Ahead complete_polyhedra(Pair& pair, const geometry::Frame& a, const geometry::Frame& b);
+  std::optional<geometry::Touch> find_deepest(const Pair& pair, const geometry::Frame& a, const geometry::Frame& b);
   geometry::Frame find_flown(int body, double time_s) const;
   void add(Pair& pair, const geometry::Deepest& deepest);
   void add(Pair& pair, const geometry::Touch& touch);

@@ -373,7 +373,8 @@ void Windows::extend(int body, double least_m_s) {
   if (bodies_.ground() && box.low[2] < bodies_.ground()->height_m) add(body, -1);
   for (int j = 0; j < bodies_.count(); ++j) {
     if (j == body || bodies_.is_absent(j)) continue;
-    const double reach_m = bodies_.moves(j) ? reach_m_s_[j] * (flying_[j] ? kLength : others_left) + kBoxMarginM : 0.0;
+    const double reach_m =
+        bodies_.moves(j) ? reach_m_s_[j] * (flying_[j] ? kLength : others_left) + bodies_.get_swing(j) + kBoxMarginM : 0.0;
     if (!box.overlaps(bodies_.calc_box(j, reach_m)) || bodies_.is_joined(body, j)) continue;
     undo_flight(j, body);
     add(body, j);
