@@ -498,9 +498,11 @@ def test_throw():
         loud = levels[1] > levels[1].max() - 60.0
         low, high = levels[1:].min(axis=0), levels[1:].max(axis=0)
         beyond = np.maximum(levels[0] - high, low - levels[0]) - (high - low)  # one more run may be outside five others
-        determined = int((loud & (high - low < 1.0)).sum())
-        print(f"windows of 125 ms: {beyond[loud].max():.2f} dB beyond native runs, limit 3 dB; {determined} the same to 1 dB")
-        assert loud.sum() >= 6 and determined >= 3 and beyond[loud].max() < 3.0, levels
+        middle = np.sort(levels[1:], axis=0)[1:-1]
+        determined = loud & (np.ptp(middle, axis=0) < 1.0)  # three of five native runs agree
+        away = abs(levels[0] - middle[1])[determined]
+        print(f"windows of 125 ms: {beyond[loud].max():.2f} dB beyond native runs; where these agree, {away.max():.2f} dB; limit 3 dB")
+        assert loud.sum() >= 6 and len(away) >= 3 and away.max() < 3.0 and beyond[loud].max() < 3.0, levels
 
 
 def test_live():
