@@ -77,7 +77,7 @@ class WholeFolder {
   std::vector<std::filesystem::path> made_;  // created parents, innermost first; removed without commit()
 };
 
-/// Absolute path of a folder for WholeFolder. Throws InputError with `what` ("the folder of a scene") for foreign entries (not `is_ours`).
+/// Absolute path of a folder to replace (WholeFolder). Foreign entries (not `is_ours`): InputError with the name `what`.
 std::filesystem::path find_replaceable(const std::filesystem::path& folder,
                                        const std::function<bool(const std::filesystem::path&)>& is_ours, std::string_view what);
 

@@ -489,20 +489,18 @@ def test_throw():
         native = bench.render_file(scene)
         first = int(np.argmax(abs(native[:, 0]) > 0.1 * abs(native[:4800, 0]).max()))
         check("the first hit", page[first - 48 : first + 960], native[first - 48 : first + 960])
-        # Bounces amplify rounding: later windows differ as those of native runs that start 1e-12 m apart.
+        # Bounces amplify rounding: later windows differ as those of native runs that start 1e-14 m apart.
         others = []
-        for offset_m in (-1e-12, -1e-13, 1e-13, 1e-12):
+        for offset_m in (-1e-14, -1e-15, 1e-15, 1e-14):
             moved = [{**b, "position_m": [b["position_m"][0] + offset_m, *b["position_m"][1:]]} for b in bodies]
             others.append(bench.render_file({**scene, "bodies": moved}))
         levels = np.array([10.0 * np.log10(np.mean(x.reshape(-1, 6000, 2) ** 2.0, axis=(1, 2)) + 1e-30) for x in (page, native, *others)])
         loud = levels[1] > levels[1].max() - 60.0
         low, high = levels[1:].min(axis=0), levels[1:].max(axis=0)
         beyond = np.maximum(levels[0] - high, low - levels[0]) - (high - low)  # one more run may be outside five others
-        middle = np.sort(levels[1:], axis=0)[1:-1]
-        determined = loud & (np.ptp(middle, axis=0) < 1.0)  # three of five native runs agree
-        away = abs(levels[0] - middle[1])[determined]
-        print(f"windows of 125 ms: {beyond[loud].max():.2f} dB beyond native runs; where these agree, {away.max():.2f} dB; limit 3 dB")
-        assert loud.sum() >= 6 and len(away) >= 3 and away.max() < 3.0 and beyond[loud].max() < 3.0, levels
+        determined = int((loud & (high - low < 1.0)).sum())
+        print(f"windows of 125 ms: {beyond[loud].max():.2f} dB beyond native runs, limit 3 dB; {determined} the same to 1 dB")
+        assert loud.sum() >= 6 and determined >= 3 and beyond[loud].max() < 3.0, levels
 
 
 def test_live():
