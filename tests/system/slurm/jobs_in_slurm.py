@@ -20,6 +20,7 @@ SCRIPT = pathlib.Path(__file__).resolve().parents[3] / "deploy/slurm/cluster"
 os.environ["SLURM_CONF"] = str(CLUSTER / "slurm.conf")
 QUICK = 300  # nodes: a second of work
 SLOW = {"nodes": 20000, "band_hz": [20, 400000]}  # ten seconds on two idle cores, with several checkpoints
+PATIENCE_S = 300  # below CTest's limit, so that a wait without an end prints the job's log; no correct run comes near it
 
 
 def check(holds, text):
@@ -52,7 +53,7 @@ class Store:
             [BIN / "carillon", "--profile", self.folder / "profile.json", "--json", *words],
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=PATIENCE_S,
             cwd=self.folder,
         )
         check(code is None or done.returncode == code, f"carillon {words}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}")
@@ -61,7 +62,7 @@ class Store:
     def run_lines(self, *words):
         """run() for a command that prints one object per line."""
         words = [BIN / "carillon", "--profile", self.folder / "profile.json", "--json", *words]
-        done = subprocess.run(words, capture_output=True, text=True, timeout=120, cwd=self.folder)
+        done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, cwd=self.folder)
         check(done.returncode == 0, f"carillon {words}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}")
 
     def write(self, name, nodes, number=0, **more):
@@ -78,7 +79,7 @@ class Store:
     def status(self, job):
         return next(row for row in self.run("status")["jobs"] if row["id"] == job["id"])
 
-    def wait(self, job, state, seconds=100):
+    def wait(self, job, state, seconds=PATIENCE_S):
         deadline = time.monotonic() + seconds
         while (row := self.status(job))["state"] != state:
             check(time.monotonic() < deadline, lambda: f"not {state} after {seconds} s: {row}\n{self.log(job)}")
@@ -86,7 +87,7 @@ class Store:
             time.sleep(0.5)
         return row
 
-    def wait_until(self, holds, seconds=100):
+    def wait_until(self, holds, seconds=PATIENCE_S):
         deadline = time.monotonic() + seconds
         while not holds(counts := self.run("status")["counts"]):
             check(time.monotonic() < deadline, lambda: f"not in {seconds} s: {counts}")
@@ -106,7 +107,7 @@ class Store:
 
     def wait_for_solver(self, job, count):
         """Ranks of a running job after its first checkpoint."""
-        deadline = time.monotonic() + 100
+        deadline = time.monotonic() + PATIENCE_S
         while True:
             ranks = [
                 int(pid)
@@ -276,7 +277,7 @@ def killed_task(store):
     mine = [int(pid) for pid in runner if str(store.folder) in pathlib.Path(f"/proc/{pid}/cmdline").read_text()]
     check(len(mine) == 1, f"no runner: {runner}")
     os.kill(mine[0], signal.SIGKILL)
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + PATIENCE_S
     while not (store.work(wide) / "outcome.json").exists():
         check(time.monotonic() < deadline, "its attempt does not end with it")
         time.sleep(0.2)
@@ -296,7 +297,7 @@ def cancel(store):
     store.wait_for_solver(one, 2)
     for job in (two, one):
         store.run("cancel", job["id"])
-        row = store.wait(job, "cancelled", 40)
+        row = store.wait(job, "cancelled")
         check("cancelled" in row["reason"], f"no reason: {row}")
     alive = subprocess.run(["squeue", "--noheader", "--states=pending,running", "--format=%i"], capture_output=True, text=True).stdout
     check(alive == "", f"still in Slurm: {alive}")
@@ -304,7 +305,7 @@ def cancel(store):
     row = store.status(two)
     check(row["slurm_job"], f"not handed over again: {row}")
     subprocess.run(["scancel", row["slurm_job"]], check=True)
-    check("scancel" in store.wait(two, "cancelled", 40)["reason"], "who cancelled is not reported")
+    check("scancel" in store.wait(two, "cancelled")["reason"], "who cancelled is not reported")
 
 
 def time_limit(store):
@@ -312,7 +313,7 @@ def time_limit(store):
     piece."""
     job = store.submit(store.write("slow.json", **SLOW), "--ranks", "2", "--time-limit", "10m")[0]
     ranks = store.wait_for_solver(job, 2)
-    deadline = time.monotonic() + 100
+    deadline = time.monotonic() + PATIENCE_S
     while not (store.status(job)["modes_done"] or 0) > 0:
         check(time.monotonic() < deadline, lambda: f"nothing is found: {store.status(job)}\n{store.log(job)}")
         time.sleep(0.1)
@@ -321,7 +322,7 @@ def time_limit(store):
         limit = subprocess.run(["scontrol", "--oneliner", "show", "job", slurm_job], capture_output=True, text=True).stdout
         check("TimeLimit=00:10:00" in limit, f"the limit is not Slurm's: {limit}")
         subprocess.run(["scancel", "--batch", "--signal=USR1", slurm_job], check=True)
-    row = store.wait(job, "done", 150)
+    row = store.wait(job, "done")
     check(row["slurm_job"] is None or row["slurm_job"] == slurm_job, f"another job of Slurm did it: {row}")
     check(
         "Restarts=1" in subprocess.run(["scontrol", "--oneliner", "show", "job", slurm_job], capture_output=True, text=True).stdout,
@@ -336,7 +337,7 @@ def killed_rank(store):
     """SIGKILL of one rank: the job is requeued with a back-off and completes."""
     job = store.submit(store.write("slow.json", **SLOW), "--ranks", "2")[0]
     os.kill(store.wait_for_solver(job, 2)[0], signal.SIGKILL)
-    store.wait(job, "done", 150)
+    store.wait(job, "done")
     check(
         "queued again in Slurm" in store.log(job) and "killed" in store.log(job),
         lambda: f"the log does not say that a rank was killed:\n{store.log(job)}",
@@ -349,7 +350,7 @@ def wait_until_saved(number):
     saved = pathlib.Path(os.environ["SLURM_CONF"]).parent / "state/job_state"
     since = time.time()
     subprocess.run(["scontrol", "update", f"JobId={number}", "TimeLimit=300"], check=True)
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + PATIENCE_S
     while not saved.exists() or saved.stat().st_mtime < since:
         check(time.monotonic() < deadline, "slurmctld does not write its state")
         time.sleep(0.2)
@@ -360,7 +361,7 @@ def killed_daemon(store):
     afterwards."""
     job = store.submit(store.write("slow.json", **SLOW), "--ranks", "2")[0]
     with paused(store.wait_for_solver(job, 2)):
-        wait_until_saved(store.wait(job, "running", 20)["slurm_job"])
+        wait_until_saved(store.wait(job, "running")["slurm_job"])
         cluster("kill", "slurmd")
         cluster("kill", "slurmctld")
         check(store.status(job)["state"] == "running", lambda: f"a controller that does not answer changed the state: {store.status(job)}")
@@ -368,12 +369,12 @@ def killed_daemon(store):
         check(waiting["state"] == "queued" and waiting["slurm_job"] is None, f"handed over to no Slurm: {waiting}")
         cluster("revive", "slurmctld")
         cluster("revive", "slurmd")
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + PATIENCE_S
         while subprocess.run(["scontrol", "ping"], capture_output=True, text=True).stdout.find("UP") < 0 and time.monotonic() < deadline:
             time.sleep(0.2)
     store.submit(store.folder / "quick.json")
     for ended in (job, waiting):
-        store.wait(ended, "done", 150)
+        store.wait(ended, "done")
         store.check_bank(ended)
 
 
@@ -397,7 +398,7 @@ def lost_registry(store):
 def memory_limit(store):
     """More memory than requested: failed with a reason and a remedy, without retries."""
     job = store.submit(store.write("big.json", 80000), "--ranks", "1", "--memory-gb", "0.06")[0]
-    row = store.wait(job, "failed", 100)
+    row = store.wait(job, "failed")
     check("memory" in row["reason"] and "memory_gb" in row["reason"], f"not the true reason: {row['reason']}")
     check(row["attempts"] == 1, f"tried again: {row}")
     refused = store.run("submit", store.write("huge.json", QUICK), "--ranks", "1", "--memory-gb", "100000", code=3)["jobs"][0]
@@ -424,7 +425,7 @@ def main():
             "memory_limit": memory_limit,
         }[CASE](store)
     finally:
-        subprocess.run(["scancel", "--quiet", f"--user={os.getuid()}"], timeout=60)
+        subprocess.run(["scancel", "--quiet", f"--user={os.getuid()}"], timeout=PATIENCE_S)
     print(f"{CASE}: ok")
     return 0
 
