@@ -129,6 +129,7 @@ std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
   const FlowLoops& loops = find_flow_loops();
   const Recurrence recurrence;
   const std::size_t modes = bank.mode_count(), rows = (modes + kFlowRows - 1) / kFlowRows * kFlowRows;
+  if (modes == 0) return {};  // a stiff body has none in its band
   const double per_area = 1.0 / (skin.radius_m * skin.radius_m);
   std::vector<double> flow(rows * kFlowColumns), squares(modes);  // in integer steps of the shapes
   std::vector<float> through(kFlowBlock * rows), harmonic(kFlowBlock * kFlowColumns), block_squares(modes);
