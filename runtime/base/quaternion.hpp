@@ -30,6 +30,13 @@ inline Mat3 make_rotation(const Quaternion& q) {
           Vec3{2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
 }
 
+/// From a rotation vector [rad], exact.
+inline Quaternion make_turn(const Vec3& turn) {
+  const double angle = norm(turn);
+  const double s = angle > 1e-6 ? std::sin(0.5 * angle) / angle : 0.5 - angle * angle / 48.0;
+  return {std::cos(0.5 * angle), s * turn[0], s * turn[1], s * turn[2]};
+}
+
 /// Inverse rotation.
 constexpr Quaternion find_inverse(const Quaternion& q) noexcept { return {q[0], -q[1], -q[2], -q[3]}; }
 

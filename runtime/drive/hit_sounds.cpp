@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "runtime/base/groups.hpp"
+#include "runtime/drive/corners.hpp"
 #include "runtime/physics/impact/impact.hpp"
 #include "runtime/physics/impact/predict.hpp"
 #include "runtime/physics/rigid/limits.hpp"
@@ -37,6 +38,9 @@ constexpr double kRingingShare = 0.01;    // of the speed of approach: impacts o
 constexpr int kPulsePieces = 16;          // of a Hertz pulse, for its energy at every instant
 constexpr double kRattleShare = 0.1;      // of that speed where bodies rattle: slower hits are part of it
 constexpr double kLongestRattleS = 0.1;   // s
+constexpr double kTogetherPulses = 2.0;   // Hertz times; hits of two bodies that begin within them are one impact
+constexpr double kFacePartRatio = 0.25;   // of that time: corners join a face after such parts
+constexpr double kSamePlaceRatio = 0.05;  // of the size
 constexpr std::size_t kMaxTogether = 4;   // hits of an impact,
 constexpr std::size_t kMaxContacts = 8;   // and contacts, with those of supports: the cost of a step is quadratic in them
 
@@ -53,6 +57,14 @@ double calc_modal_j(const impact::Modes& modes, const std::vector<double>& shape
 
 /// Cost of a step of an impact with so many contacts, relative to one (measured: 1.1 at two, 2.3 at four, 4.3 at eight).
 double calc_step_work(std::size_t contacts) { return 0.93 + 0.07 * static_cast<double>(contacts * contacts); }
+
+/// True at an edge or a corner of one of the bodies.
+bool is_sharp(const StepView& step, const FinishedHit& hit) {
+  const auto is_at_edge = [&](int body, const Vec3& station) {
+    return body >= 0 && step.bodies[body].edges && step.bodies[body].edges->find_near(station).directions > 0;
+  };
+  return is_at_edge(hit.a, hit.stations_m[0]) || is_at_edge(hit.b, hit.stations_m[1]);
+}
 
 std::vector<double> turn_shape(const Mat3& rotation, const std::vector<double>& shape) {
   std::vector<double> turned(shape.size());
@@ -111,27 +123,27 @@ bool HitSounds::Contact::needs_modes() const {
 }
 
 /// Divides the energy lost in a step among the hits of connected bodies, in proportion to that of each as a separate impact.
-void HitSounds::share_energy(const StepView& step, std::vector<FinishedHit>& hits) {
+void HitSounds::share_energy(const StepView& step, std::span<FinishedHit* const> hits) {
   if (hits.empty()) return;
   base::Groups groups(static_cast<int>(step.bodies.size()));
-  for (const FinishedHit& hit : hits)
-    if (step.moves(hit.a) && step.moves(hit.b)) groups.join(hit.a, hit.b);
+  for (const FinishedHit* hit : hits)
+    if (step.moves(hit->a) && step.moves(hit->b)) groups.join(hit->a, hit->b);
   struct Sums {
     double lost_j = 0.0, least_j = 0.0, alone_j = 0.0;
   };
   std::map<int, Sums> sums;  // by group
   const auto find = [&](const FinishedHit& hit) -> Sums& { return sums[groups.find(step.moves(hit.a) ? hit.a : hit.b)]; };
-  for (const FinishedHit& hit : hits) {
-    if (hit.is_shared) continue;
-    Sums& sum = find(hit);
-    sum.lost_j += 0.5 * hit.push_n_s * (hit.approach_m_s - hit.parting_m_s);
-    sum.least_j += 0.5 * hit.push_n_s * hit.approach_m_s * kMinElasticShare;
-    sum.alone_j += make_rigid(hit).calc_lost_j();
+  for (const FinishedHit* hit : hits) {
+    if (hit->is_shared) continue;
+    Sums& sum = find(*hit);
+    sum.lost_j += 0.5 * hit->push_n_s * (hit->approach_m_s - hit->parting_m_s);
+    sum.least_j += 0.5 * hit->push_n_s * hit->approach_m_s * kMinElasticShare;
+    sum.alone_j += make_rigid(*hit).calc_lost_j();
   }
-  for (FinishedHit& hit : hits) {
-    if (hit.is_shared) continue;
-    const Sums& sum = find(hit);
-    if (sum.alone_j > 0.0) hit.energy_share = std::min(1.0, std::max(sum.lost_j, sum.least_j) / sum.alone_j);
+  for (FinishedHit* hit : hits) {
+    if (hit->is_shared) continue;
+    const Sums& sum = find(*hit);
+    if (sum.alone_j > 0.0) hit->energy_share = std::min(1.0, std::max(sum.lost_j, sum.least_j) / sum.alone_j);
   }
 }
 
@@ -139,26 +151,28 @@ void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, double
                     TouchesCounters& counters, std::vector<events::Event>& events) {
   join_predicted(step, hits);
   const auto name = [&](int body) { return step.scene.get_matter(body).name_hash; };
-  std::stable_sort(hits.begin(), hits.end(), [&](const FinishedHit& x, const FinishedHit& y) {
-    if (x.is_shared != y.is_shared) return y.is_shared;  // impacts may include shared ones
-    if (x.push_n_s != y.push_n_s) return x.push_n_s > y.push_n_s;
-    if (x.touch_s != y.touch_s) return x.touch_s < y.touch_s;
-    return std::pair(name(x.a), name(x.b)) < std::pair(name(y.a), name(y.b));
+  std::vector<FinishedHit*> sorted;
+  for (FinishedHit& hit : hits) sorted.push_back(&hit);
+  std::stable_sort(sorted.begin(), sorted.end(), [&](const FinishedHit* x, const FinishedHit* y) {
+    if (x->is_shared != y->is_shared) return y->is_shared;  // impacts may include shared ones
+    if (x->push_n_s != y->push_n_s) return x->push_n_s > y->push_n_s;
+    if (x->touch_s != y->touch_s) return x->touch_s < y->touch_s;
+    return std::pair(name(x->a), name(x->b)) < std::pair(name(y->a), name(y->b));
   });
-  share_energy(step, hits);
+  share_energy(step, sorted);
   const double burst = kWorkPerImpact * step.options.max_impacts;
   work_left_ = std::min(burst, work_left_ + burst * kBurstsPerS * (step.scene.time_s - std::exchange(worked_s_, step.scene.time_s)));
   const double oldest_s = step.scene.before_s - 2.0 * step.options.longest_hit_s;
   for (auto* times : {&included_s_, &rattles_s_}) std::erase_if(*times, [&](const auto& spot) { return spot.second < oldest_s; });
   double largest_n_s = 0.0;
-  for (const FinishedHit& hit : hits) largest_n_s = std::max(largest_n_s, hit.push_n_s);
+  for (const FinishedHit* hit : sorted) largest_n_s = std::max(largest_n_s, hit->push_n_s);
   std::vector<const FinishedHit*> heard;
-  for (const FinishedHit& hit : hits) {
-    const Vec3 where = step.place(step.scene.motions, hit.a, hit.stations_m[0]);
-    lasting.note_impact(step.scene, hit.a, hit.b, where, step.scene.time_s);
-    const bool is_felt = hit.push_n_s * hit.inverse_mass >= 0.2 * rigid::kMinImpactSpeedMS;
-    if (is_felt && hit.push_n_s >= kQuietRatio * largest_n_s)
-      heard.push_back(&hit);
+  for (const FinishedHit* hit : sorted) {
+    const Vec3 where = step.place(step.scene.motions, hit->a, hit->stations_m[0]);
+    lasting.note_impact(step.scene, hit->a, hit->b, where, step.scene.time_s);
+    const bool is_felt = hit->push_n_s * hit->inverse_mass >= 0.2 * rigid::kMinImpactSpeedMS;
+    if (is_felt && hit->push_n_s >= kQuietRatio * largest_n_s)
+      heard.push_back(hit);
     else
       ++counters.masked;
   }
@@ -182,19 +196,21 @@ void HitSounds::add(const StepView& step, std::vector<FinishedHit>& hits, double
 /// The hit with the simultaneous ones of its bodies, if any of them needs modes; else the hit alone.
 std::vector<HitSounds::Contact> HitSounds::gather(const StepView& step, std::span<const FinishedHit* const> hits, std::size_t first) {
   const FinishedHit& seed = *hits[first];
-  std::vector<Contact> together{make_contact(step, seed)};
-  std::vector<std::size_t> others;
-  for (std::size_t i = first + 1; i < hits.size() && together.size() < kMaxTogether; ++i) {
+  std::vector<Contact> alone{make_contact(step, seed)};
+  std::vector<std::size_t> chosen{first};
+  for (std::size_t i = first + 1; i < hits.size() && chosen.size() < kMaxTogether; ++i) {
     const FinishedHit& hit = *hits[i];
-    if (taken_[i] != 0 || hit.a != seed.a || hit.b != seed.b || hit.opened_s != seed.opened_s) continue;
-    if (std::abs(hit.touch_s - seed.touch_s) > together.front().blow.duration_s) continue;
-    others.push_back(i);
-    together.push_back(make_contact(step, hit));
+    if (taken_[i] == 0 && hit.a == seed.a && hit.b == seed.b &&
+        std::abs(hit.touch_s - seed.touch_s) <= kTogetherPulses * alone.front().blow.duration_s)
+      chosen.push_back(i);
   }
-  if (std::none_of(together.begin(), together.end(), [](const Contact& c) { return c.needs_modes(); }))
-    while (together.size() > 1) together.pop_back();
-  else
-    for (const std::size_t i : others) taken_[i] = 1;
+  if (chosen.size() == 1) return alone;
+  // The earliest has the motions before the impact.
+  std::stable_sort(chosen.begin(), chosen.end(), [&](std::size_t i, std::size_t j) { return hits[i]->opened_s < hits[j]->opened_s; });
+  std::vector<Contact> together;
+  for (const std::size_t i : chosen) together.push_back(make_contact(step, *hits[i]));
+  if (std::none_of(together.begin(), together.end(), [](const Contact& c) { return c.needs_modes(); })) return alone;
+  for (const std::size_t i : chosen) taken_[i] = 1;
   return together;
 }
 
@@ -443,94 +459,156 @@ void HitSounds::add_modal_forces(std::span<const Contact> contacts, std::span<co
   }
 }
 
-/// Integrates an impact within the remaining work. False: below kShortestPulses; no work remains.
-bool HitSounds::advance(impact::Impact& impact, std::size_t contacts, double hertz_s) {
-  const double work = calc_step_work(contacts), most_s = (work_left_ + kMaxDebt) / work * impact.get_step_length();
+/// Integrates an impact within the remaining work. `faces`: as its contacts. False: below kShortestPulses; no work remains.
+bool HitSounds::advance(impact::Impact& impact, std::span<const impact::FaceCorner> faces, double hertz_s) {
+  const double work = calc_step_work(faces.size()), most_s = (work_left_ + kMaxDebt) / work * impact.get_step_length();
   if (most_s < kShortestPulses * hertz_s) {
     work_left_ = 0.0;
     return false;
   }
-  (void)impact.advance(std::min({kLongestImpactS, kLongestPulses * hertz_s, most_s}));
+  const double end_s = std::min({kLongestImpactS, kLongestPulses * hertz_s, most_s});
+  const bool has_face = std::count_if(faces.begin(), faces.end(), [](const impact::FaceCorner& c) { return c.is_sharp; }) >= 3;
+  const double part_s = has_face ? std::max(kFacePartRatio * hertz_s, impact.get_step_length()) : end_s;
+  std::vector<impact::Spring> alone;
+  for (int k = 0; k < std::ssize(faces); ++k) alone.push_back(impact.get_contact(k).spring);
+  for (double to_s = part_s; !impact.has_ended() && impact.get_time() < end_s; to_s += part_s) {
+    if (has_face) {
+      std::vector<impact::Spring> springs = alone;
+      for (int k = 0; k < std::ssize(faces); ++k)
+        if (impact.get_compression(k) > 0.0) springs[k] = impact.get_contact(k).spring;
+      impact::share_faces(impact, faces, rigid::kMaxDepthM, part_s, springs);
+      for (int k = 0; k < std::ssize(faces); ++k)
+        if (springs[k] != impact.get_contact(k).spring) impact.exchange_spring(k, springs[k]);
+    }
+    (void)impact.advance(std::min(to_s, end_s));
+  }
   work_left_ -= work * impact.get_steps();
   return true;
 }
 
-/// False if it cannot be integrated: nothing is appended. As in our own contact, supported bodies are struck together with their supports.
-bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits, TouchesCounters& counters,
-                          std::vector<events::Event>& events) {
+/// The contacts of an impact: hits, corners that land with them, and supports, as our own contact strikes supported bodies together with
+/// their supports.
+HitSounds::Setup HitSounds::choose_contacts(const StepView& step, const std::vector<Contact>& hits) const {
   const FinishedHit& first = hits.front().hit;
-  double touch_s = first.touch_s, hertz_s = 0.0, wanted = 0.0, blow_j = 0.0, most_j = 0.0;
-  std::vector<const FinishedHit*> together;
+  Setup setup{.touch_s = first.touch_s, .contacts = hits};
+  for (const Contact& c : hits) setup.touch_s = std::min(setup.touch_s, c.hit.touch_s);
+  for (const Contact& c : hits) setup.gaps_m.push_back((c.hit.touch_s - setup.touch_s) * c.hit.approach_m_s);
+  const std::vector<Corner> corners = find_corners(step, first, kTogetherPulses * hits.front().blow.duration_s * first.approach_m_s);
+  const double near_m = kSamePlaceRatio * step.scene.calc_size(first.a, first.b);
+  std::vector<const Corner*> of_hits;
   for (const Contact& c : hits) {
-    together.push_back(&c.hit);
-    touch_s = std::min(touch_s, c.hit.touch_s);
-    hertz_s = std::max(hertz_s, c.blow.duration_s);
-    wanted += c.hit.push_n_s;
-    blow_j += c.hit.energy_share * c.rigid.calc_energy_j();
-    most_j += c.hit.energy_share * c.rigid.calc_lost_j();
+    const auto is_here = [&](const Corner& corner) { return norm(corner.stations_m[0] - c.hit.stations_m[0]) < near_m; };
+    const auto found = std::find_if(corners.begin(), corners.end(), is_here);
+    if (found != corners.end()) of_hits.push_back(&*found);
   }
-  std::vector<Contact> contacts = hits;
+  setup.silent.reserve(corners.size());
+  if (of_hits.size() == hits.size()) {
+    for (std::size_t i = 0; i < hits.size(); ++i) setup.gaps_m[i] = of_hits[i]->gap_m;
+    for (const Corner& corner : corners) {
+      if (setup.contacts.size() == kMaxContacts || std::find(of_hits.begin(), of_hits.end(), &corner) != of_hits.end()) continue;
+      const FinishedHit& hit = setup.silent.emplace_back(FinishedHit{.a = first.a,
+                                                                     .b = first.b,
+                                                                     .touch_s = setup.touch_s,
+                                                                     .approach_m_s = first.approach_m_s,
+                                                                     .curvature_per_m = TouchPoint::kUnknown,
+                                                                     .normal = first.normal,
+                                                                     .stations_m = corner.stations_m,
+                                                                     .outwards = first.outwards,
+                                                                     .before = first.before});
+      setup.contacts.push_back(make_contact(step, hit));
+      setup.gaps_m.push_back(corner.gap_m);
+    }
+  }
+  setup.struck = setup.contacts.size();
   for (const FinishedHit& support : first.supports) {
     const auto is_same = [&](const Contact& c) { return c.hit.spot == support.spot; };
-    if (contacts.size() == kMaxContacts || std::any_of(hits.begin(), hits.end(), is_same)) continue;
-    contacts.push_back(make_contact(step, support));
+    if (setup.contacts.size() == kMaxContacts || std::any_of(hits.begin(), hits.end(), is_same)) continue;
+    setup.contacts.push_back(make_contact(step, support));
+    setup.gaps_m.push_back(0.0);
   }
-  std::vector<impact::Body> bodies;
-  std::vector<int> names;  // of the bodies
+  return setup;
+}
+
+HitSounds::Setup HitSounds::set_up(const StepView& step, const std::vector<Contact>& hits) {
+  Setup setup = choose_contacts(step, hits);
   const auto find_body = [&](const Contact& c, std::size_t side) {
     const int body = side == 0 ? c.hit.a : c.hit.b;
     if (body < 0) return -1;
-    const auto found = std::find(names.begin(), names.end(), body);
-    if (found != names.end()) return static_cast<int>(found - names.begin());
-    names.push_back(body);
-    bodies.push_back(make_body(step, body, c.hit.before[side], !c.shapes[side].empty(), touch_s));
-    return static_cast<int>(names.size()) - 1;
+    const auto found = std::find(setup.names.begin(), setup.names.end(), body);
+    if (found != setup.names.end()) return static_cast<int>(found - setup.names.begin());
+    setup.names.push_back(body);
+    setup.bodies.push_back(make_body(step, body, c.hit.before[side], !c.shapes[side].empty(), setup.touch_s));
+    return static_cast<int>(setup.names.size()) - 1;
   };
-  std::vector<std::array<std::vector<double>, 2>> shapes(contacts.size());
-  std::vector<impact::Contact> springs;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const Contact& c = contacts[i];
+  setup.shapes.resize(setup.contacts.size());
+  for (std::size_t i = 0; i < setup.contacts.size(); ++i) {
+    const Contact& c = setup.contacts[i];
     const FinishedHit& hit = c.hit;
-    impact::Contact& contact = springs.emplace_back();
+    impact::Contact& contact = setup.springs.emplace_back();
     contact.a = find_body(c, 0);
     contact.b = find_body(c, 1);
     contact.where_m = hit.before[0].centre_m + hit.before[0].rotation * (hit.stations_m[0] - step.scene.bodies[hit.a].centre_m);
     contact.normal = hit.normal;
-    contact.gap_m = i < hits.size() ? (hit.touch_s - touch_s) * hit.approach_m_s : 0.0;  // supports are closed
+    contact.gap_m = setup.gaps_m[i];
     contact.spring.stiffness = impact::calc_hertz_stiffness(c.compliance, c.radius_m);
     contact.restitution = step.calc_restitution(hit.a, hit.b);
     contact.is_limit = true;
     contact.rests = !(hit.approach_m_s > rigid::kMinImpactSpeedMS);
     contact.friction = step.calc_friction(hit.a, hit.b);
     for (const std::size_t side : {0, 1})
-      if (!c.shapes[side].empty()) shapes[i][side] = turn_shape(hit.before[side].rotation, c.shapes[side]);
-    contact.shape_a = shapes[i][0];
-    contact.shape_b = shapes[i][1];
+      if (!c.shapes[side].empty()) setup.shapes[i][side] = turn_shape(hit.before[side].rotation, c.shapes[side]);
+    contact.shape_a = setup.shapes[i][0];
+    contact.shape_b = setup.shapes[i][1];
+    setup.faces.push_back({.is_sharp = is_sharp(step, hit),
+                           .where_m = contact.where_m,
+                           .normal = hit.normal,
+                           .size_m = step.scene.calc_size(hit.a, hit.b),
+                           .compliance_per_pa = c.compliance});
   }
+  return setup;
+}
+
+/// False if it cannot be integrated: nothing is appended.
+bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits, TouchesCounters& counters,
+                          std::vector<events::Event>& events) {
+  double hertz_s = 0.0, wanted = 0.0, blow_j = 0.0, most_j = 0.0;
+  for (const Contact& c : hits) {
+    hertz_s = std::max(hertz_s, c.blow.duration_s);
+    wanted += c.hit.push_n_s;
+    blow_j += c.hit.energy_share * c.rigid.calc_energy_j();
+    most_j += c.hit.energy_share * c.rigid.calc_lost_j();
+  }
+  const Setup setup = set_up(step, hits);
+  const double touch_s = setup.touch_s;
   std::optional<impact::Impact> impact;
   try {
     // The engine keeps the bodies apart, and the impulse of the impact must be that of the rigid bodies.
-    impact.emplace(bodies, springs, impact::Options{.max_yielded_m = std::numeric_limits<double>::infinity()});
+    impact.emplace(setup.bodies, setup.springs, impact::Options{.max_yielded_m = std::numeric_limits<double>::infinity()});
     bool closes = false;
-    for (int i = 0; i < static_cast<int>(springs.size()); ++i) closes = closes || impact->calc_approach(i) > rigid::kMinImpactSpeedMS;
-    if (!closes || !advance(*impact, contacts.size(), hertz_s)) return false;
+    for (int i = 0; i < std::ssize(setup.springs); ++i) closes = closes || impact->calc_approach(i) > rigid::kMinImpactSpeedMS;
+    if (!closes || !advance(*impact, setup.faces, hertz_s)) return false;
   } catch (const std::invalid_argument&) {
     return false;
   }
   const std::vector<impact::Pulse> pulses = impact->take_pulses();
   if (pulses.empty()) return false;
+  std::vector<const FinishedHit*> together;
+  for (const Contact& c : std::span(setup.contacts).first(setup.struck)) together.push_back(&c.hit);
   const std::vector<double> pushes = calc_rigid_pushes(step, together);
   const double rigid = std::accumulate(pushes.begin(), pushes.end(), 0.0);
   const double largest = rigid > 0.0 ? std::min(1.0, wanted / rigid) : 1.0;
   std::vector<StruckBody> struck;
-  for (std::size_t i = 0; i < names.size(); ++i) struck.push_back({bodies[i].modes, &ringing_[names[i]], {}});
-  add_modal_forces(contacts, springs, pulses, touch_s, struck);
-  const double scale = keep_ringing(*impact, bodies, struck, touch_s, largest, blow_j, most_j);
+  for (std::size_t i = 0; i < setup.names.size(); ++i) struck.push_back({setup.bodies[i].modes, &ringing_[setup.names[i]], {}});
+  add_modal_forces(setup.contacts, setup.springs, pulses, touch_s, struck);
+  const double scale = keep_ringing(*impact, setup.bodies, struck, touch_s, largest, blow_j, most_j);
   if (scale < largest) ++counters.limited;
   counters.impacts += std::ssize(hits);
-  for (const Contact& c : std::span(contacts).subspan(hits.size())) included_s_[c.hit.spot] = first.end_s;
-  for (const Contact& c : contacts) rattles_s_[c.hit.spot] = find_rattle_end(step, c, touch_s + impact->get_time());
-  for (std::size_t i = 0; i < contacts.size(); ++i) add_forces(step, contacts[i], touch_s, i, pulses, scale, events);
+  for (const Contact& c : std::span(setup.contacts).subspan(setup.struck)) included_s_[c.hit.spot] = hits.front().hit.end_s;
+  for (std::size_t i = 0; i < setup.contacts.size(); ++i) {
+    const Contact& c = setup.contacts[i];
+    if (c.hit.spot != 0) rattles_s_[c.hit.spot] = find_rattle_end(step, c, touch_s + impact->get_time());
+    add_forces(step, c, touch_s, i, pulses, scale, events);
+  }
   return true;
 }
 

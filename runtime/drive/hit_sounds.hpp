@@ -10,7 +10,7 @@
 #include "runtime/drive/pulses.hpp"
 #include "runtime/drive/ringing.hpp"
 #include "runtime/drive/touch_spots.hpp"
-#include "runtime/physics/impact/impact.hpp"
+#include "runtime/physics/impact/face.hpp"
 
 namespace carillon::drive {
 
@@ -61,8 +61,23 @@ class HitSounds {
     bool needs_modes() const;
   };
 
+  /// An impact before its integration. `contacts`: the hits, `silent` corners without an impulse of the engine, then supports; lengths of
+  /// the others: one per contact.
+  struct Setup {
+    double touch_s = 0.0;
+    std::vector<FinishedHit> silent{};
+    std::vector<Contact> contacts{};
+    std::size_t struck = 0;  // contacts that are no supports
+    std::vector<double> gaps_m{};
+    std::vector<std::array<std::vector<double>, 2>> shapes{};  // of a and b, world axes
+    std::vector<impact::Contact> springs{};
+    std::vector<impact::FaceCorner> faces{};
+    std::vector<impact::Body> bodies{};
+    std::vector<int> names{};  // of the bodies
+  };
+
   static RigidBlow make_rigid(const FinishedHit& hit);
-  static void share_energy(const StepView& step, std::vector<FinishedHit>& hits);
+  static void share_energy(const StepView& step, std::span<FinishedHit* const> hits);
   Contact make_contact(const StepView& step, const FinishedHit& hit) const;
   double calc_ringing(const StepView& step, const Contact& contact, double time_s, bool is_speed) const;
   double find_rattle_end(const StepView& step, const Contact& contact, double time_s) const;
@@ -72,7 +87,9 @@ class HitSounds {
   std::vector<StruckBody> find_struck(const StepView& step, const Contact& contact);
   static std::vector<double> calc_rigid_pushes(const StepView& step, std::span<const FinishedHit* const> hits);
   static void join_predicted(const StepView& step, std::vector<FinishedHit>& hits);
-  bool advance(impact::Impact& impact, std::size_t contacts, double hertz_s);
+  bool advance(impact::Impact& impact, std::span<const impact::FaceCorner> faces, double hertz_s);
+  Setup choose_contacts(const StepView& step, const std::vector<Contact>& hits) const;
+  Setup set_up(const StepView& step, const std::vector<Contact>& hits);
   bool integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);
   impact::Body make_body(const StepView& step, int index, const Motion& before, bool has_modes, double touch_s);
   static double keep_ringing(const impact::Impact& impact, std::vector<impact::Body> before, std::vector<StruckBody>& struck,

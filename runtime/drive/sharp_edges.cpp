@@ -13,7 +13,8 @@ namespace {
 constexpr double kSharpCosine = 0.906;   // of 25 degrees
 constexpr double kParallelCosine = 0.9;  // edges of one direction
 constexpr double kNearRatio = 0.01;      // of the size
-constexpr double kFlatCosine = 0.9998;   // of 1 degree: facets of a flat surface
+constexpr std::size_t kMaxCorners = 64;
+constexpr double kFlatCosine = 0.9998;  // of 1 degree: facets of a flat surface
 
 }  // namespace
 
@@ -54,6 +55,24 @@ SharpEdges::SharpEdges(std::span<const Vec3> vertices, std::span<const std::arra
     for (const std::size_t facet : {seam.facet, seam.next})
       if (curved[facet] != 0) edge.outward = normals[facet];
     add(edge);
+  }
+  find_corners();
+}
+
+/// Ends of edges of two directions.
+void SharpEdges::find_corners() {
+  std::map<Vec3, Vec3> directions;  // of an edge at each end
+  for (const Edge& edge : edges_) {
+    if (edge.outward != Vec3{}) continue;
+    const Vec3 direction = calc_unit(edge.end - edge.begin);
+    for (const Vec3& end : {edge.begin, edge.end}) {
+      const auto [at, is_first] = directions.try_emplace(end, direction);
+      const bool turns = !is_first && std::abs(dot(at->second, direction)) < kParallelCosine;
+      if (turns && std::find(corners_.begin(), corners_.end(), end) == corners_.end()) corners_.push_back(end);
+      if (corners_.size() <= kMaxCorners) continue;
+      corners_.clear();
+      return;
+    }
   }
 }
 

@@ -24,6 +24,8 @@ class SharpEdges {
 
   /// Edges within 1 % of the size of a contact point [m].
   NearEdges find_near(const Vec3& point_m) const;
+  /// Corners of flat faces [m]; empty for a body with more than 64.
+  std::span<const Vec3> get_corners() const { return corners_; }
 
  private:
   struct Edge {
@@ -36,9 +38,11 @@ class SharpEdges {
   };
   Cell find_cell(const Vec3& x) const;
   void add(const Edge& edge);
+  void find_corners();
 
   double near_m_;
   std::vector<Edge> edges_;
+  std::vector<Vec3> corners_;
   std::unordered_map<Cell, std::vector<int>, Hash> cells_;  // edges within near_m_ of the cell
 };
 

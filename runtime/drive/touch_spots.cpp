@@ -111,6 +111,7 @@ void TouchSpots::forget(int body) {
 void TouchSpots::hold_shared(std::vector<FinishedHit>& hits) {
   std::move(held_.begin(), held_.end(), std::back_inserter(hits));
   held_.clear();
+  if (std::none_of(hits.begin(), hits.end(), [](const FinishedHit& hit) { return hit.is_shared; })) return;
   std::set<int> struck;
   for (const auto& [pair, spots] : spots_)
     for (const Spot& spot : spots)

@@ -233,7 +233,6 @@ ElasticPulse Impact::set_law(int contact, double inverse_mass, double speed_m_s)
   return pulse;
 }
 
-/// Keeps the energies of the spring and its anchor. A compressed contact keeps its spring if the new one is softer.
 void Impact::exchange_spring(int contact, const Spring& spring) {
   ContactLaw& law = laws_[contact];
   History& history = contacts_[contact];

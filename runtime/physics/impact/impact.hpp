@@ -115,6 +115,10 @@ class Impact {
   /// constructor.
   void update(std::span<const Body> bodies, std::span<const Contact> contacts);
 
+  /// Keeps the energies of the spring and its anchor; the remaining compression becomes yielded. A compressed contact keeps its spring if the
+  /// new one is softer.
+  void exchange_spring(int contact, const Spring& spring);
+
   /// Changes the velocity of a body instantaneously, as other contacts do; the energy change is booked as given. Throws for non-finite
   /// values.
   void push(int body, const Vec3& velocity_m_s, const Vec3& spin_rad_s);
@@ -172,7 +176,6 @@ class Impact {
   void choose_step(const Options& options);
   ElasticPulse set_law(int contact, double inverse_mass, double speed_m_s);
   void close_contacts();
-  void exchange_spring(int contact, const Spring& spring);
   void set_up_step();
   void step();
   void calc_free_motion();

@@ -6,12 +6,6 @@
 
 namespace carillon::rigid {
 
-Quaternion make_turn(const Vec3& turn) {
-  const double angle = norm(turn);
-  const double s = angle > 1e-6 ? std::sin(0.5 * angle) / angle : 0.5 - angle * angle / 48.0;
-  return {std::cos(0.5 * angle), s * turn[0], s * turn[1], s * turn[2]};
-}
-
 Placed place(const Solid& solid, const State& state) {
   Placed p;
   p.rotation = make_rotation(state.rotation);

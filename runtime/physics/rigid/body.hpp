@@ -16,12 +16,10 @@
 namespace carillon::rigid {
 
 using carillon::make_rotation;
+using carillon::make_turn;
 using carillon::multiply;
 using carillon::normalise;
 using carillon::Quaternion;
-
-/// From a rotation vector [rad], exact.
-Quaternion make_turn(const Vec3& turn);
 
 /// Constant properties of a body.
 struct Solid {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/physics/impact/face.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 
 namespace carillon::rigid {
@@ -17,23 +18,8 @@ constexpr double kSamePlaceRatio = 0.05;      // of the size
 constexpr double kMinMoveRatio = 0.02;        // fraction of the size: minimum distance of a contact from its touch for an update
 constexpr int kMaxFollowed = 12;              // contacts per impact, including open ones
 constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
-constexpr double kFaceCosine = 0.99;          // minimum cosine between normals of one face,
-constexpr double kFlatnessRatio = 0.02;       // fraction of the size: maximum distance of corners from its plane
 constexpr double kRoundingRatio = 1e-12;      // of velocities
 constexpr double kQuietAfterImpactS = 5e-3;   // s; after the end of an impact, without slow impacts of the pair
-
-/// Area of the convex polygon of given points [m^2].
-double calc_area(std::vector<Vec3> corners, const Vec3& normal) {
-  Vec3 middle{};
-  for (const Vec3& x : corners) middle = middle + (1.0 / static_cast<double>(corners.size())) * x;
-  const Vec3 s = find_across(normal), t = cross(normal, s);
-  const auto calc_angle = [&](const Vec3& x) { return std::atan2(dot(t, x - middle), dot(s, x - middle)); };
-  std::sort(corners.begin(), corners.end(), [&](const Vec3& x, const Vec3& y) { return calc_angle(x) < calc_angle(y); });
-  double area = 0.0;
-  for (std::size_t k = 0; k < corners.size(); ++k)
-    area += 0.5 * dot(normal, cross(corners[k] - middle, corners[(k + 1) % corners.size()] - middle));
-  return area;
-}
 
 /// Gives the nth body of an impact, now `b`, the velocities of its rigid body: a projection changes them to keep the momentum of an island.
 void push(impact::Impact& impact, int n, const impact::Body& b, const Vec3& velocity, const Vec3& spin) {
@@ -195,41 +181,21 @@ ModalContact* ModalImpacts::find_nearest(ModalImpact& modal, const Contact& touc
   return nearest;
 }
 
-/// Springs of an impact: three corners of a face that are compressed within `part_s` by more than its flatness share the spring of the
-/// face.
+/// Springs of an impact for a part of this length.
 std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal, double part_s) const {
-  const int count = static_cast<int>(modal.contacts.size());
   std::vector<impact::Spring> springs;
+  std::vector<impact::FaceCorner> corners;
   for (int k = 0; const ModalContact& contact : modal.contacts) {
+    const int a = contact.forces.a, b = contact.forces.b;
     springs.push_back(modal.impact->get_compression(k) > 0.0 ? modal.impact->get_contact(k).spring : contact.spring);
+    corners.push_back({.is_sharp = contact.is_sharp && contact.is_followed,
+                       .where_m = find_station(contact),
+                       .normal = contact.normal,
+                       .size_m = bodies_.calc_size(a, b),
+                       .compliance_per_pa = bodies_.calc_compliance(a, b)});
     ++k;
   }
-  std::vector<char> is_taken(count, 0);
-  for (int first = 0; first < count; ++first) {
-    const ModalContact& one = modal.contacts[first];
-    if (is_taken[first] != 0 || !one.is_sharp || !one.is_followed) continue;
-    std::vector<int> face;
-    std::vector<Vec3> corners;
-    for (int k = first; k < count; ++k) {
-      const ModalContact& contact = modal.contacts[k];
-      const double flat_m = springs[k].exponent == 1.0 ? 0.0 : kMaxDepthM,
-                   pressed_m = modal.impact->get_compression(k) + std::max(modal.impact->calc_approach(k), 0.0) * part_s;
-      if (is_taken[k] != 0 || !contact.is_sharp || !contact.is_followed || !contact.is_between(one.forces.a, one.forces.b) ||
-          dot(contact.normal, one.normal) < kFaceCosine || !(pressed_m > flat_m) ||
-          std::abs(dot(one.normal, find_station(contact) - find_station(one))) >
-              kFlatnessRatio * bodies_.calc_size(one.forces.a, one.forces.b))
-        continue;
-      face.push_back(k);
-      corners.push_back(find_station(contact));
-    }
-    if (face.size() < 3 || face.front() != first) continue;
-    const double stiffness =
-        impact::calc_face_stiffness(bodies_.calc_compliance(one.forces.a, one.forces.b), calc_area(corners, one.normal));
-    for (const int k : face) {
-      is_taken[k] = 1;
-      if (stiffness > 0.0) springs[k] = {.stiffness = stiffness / static_cast<double>(face.size()), .exponent = 1.0};
-    }
-  }
+  impact::share_faces(*modal.impact, corners, kMaxDepthM, part_s, springs);
   return springs;
 }
 

@@ -28,6 +28,8 @@ WANTED = {
     "rod": {**THROWN, "first_db": 1.0, "centroid_percent": 5.0, "quiet_db": 6.0},
     "row": {"first_db": 3.0, "centroid_percent": 10.0, "windows_db": 3.0},
     "bead": THROWN,
+    "flat": {"first_db": 3.0, "centroid_percent": 10.0, "end_db": 0.0},  # then each engine rocks in its own way
+    "side": {"first_db": 3.0, "centroid_percent": 10.0, "end_db": 0.0},
     "drop": THROWN,
 }
 WAYS = ("box", "tube", "two")  # with impulses found from velocities, and with early hits, in Bullet

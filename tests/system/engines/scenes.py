@@ -95,6 +95,8 @@ SCENES = {
     "rod": (2, [place("rod", "rod", ROD, (0, -0.3, 0.1), (0, 12, 0), velocity=(0, 0.3, 0))]),
     "row": (1, [place(n, "ball", BALL, (x, 0, 0.03), velocity=(v, 0, 0), spin=(0, v / 0.03, 0), moved=m) for n, x, v, m in ROW]),
     "bead": (2, [place("pane", "pane", PANE, (0, 0, 0.002), moved=(0, 0, 0)), place("bead", "bead", BEAD, (0.045, 0.03, 0.2))]),
+    "flat": (2, [place("box", "box", BOX, (0, 0, 0.1))]),
+    "side": (2, [place("box", "box", BOX, (0, 0, 0.2), (90, 0, 0))]),
     "drop": (1, [place("ball", "ball", BALL, (0, 0, 0.2), spin=(0, 10, 0))]),
 }
 

@@ -17,6 +17,7 @@ TEST(SharpEdges, BoxHasCornersAlsoOnAFace) {
   EXPECT_EQ(edges.find_near({0.0, 0.04, -0.02}).directions, 1);
   EXPECT_EQ(edges.find_near({0.0, 0.0, -0.02}).directions, 0);
   EXPECT_EQ(edges.find_near({0.0, 0.04, -0.02}).outward, Vec3{}) << "no rim";
+  EXPECT_EQ(edges.get_corners().size(), 8U);
 }
 
 TEST(SharpEdges, RimOfACylinderHasTheCurvatureOfItsSide) {
@@ -32,6 +33,7 @@ TEST(SharpEdges, RimOfACylinderHasTheCurvatureOfItsSide) {
     EXPECT_NEAR(shape.find_place(near.rim_m, near.outward).curvature_per_m, 0.5 / kRadius, 0.02 / kRadius);
     EXPECT_EQ(edges.find_near(kRadius * radial + Vec3{0, 0, 0.5 * kHalf}).outward, Vec3{}) << "away from the rim";
   }
+  EXPECT_TRUE(edges.get_corners().empty());
 }
 
 }  // namespace

@@ -53,6 +53,35 @@ TEST(TouchEnergy, BothEndsStrikeTogether) {
   }
 }
 
+/// Engines may stop a face that lands by two opposite corners: a level plate with all four or with two sounds the same.
+TEST(TouchEnergy, FaceThatLandsStrikesWithAllItsCorners) {
+  constexpr double kHalf = 0.1, kSpeed = 1.0, kRestitution = 0.5;
+  const bank::Bank plate = physics::tests::make_plate_bank(2.0 * kHalf, 5e-3, 8000.0, 8, 1.0);
+  const double impulse = (1.0 + kRestitution) * kSpeed * plate.rigid.mass_kg;
+  std::vector<events::Force> whole;
+  for (const std::size_t given : {4, 2}) {
+    Rig rig({.ground_restitution = kRestitution});
+    rig.add(plate, "plate", {0, 0, 2.5e-3}, {0, 0, -kSpeed}, kRestitution);
+    rig.start();
+    rig.step(1e-4, {});
+    rig.poses[0].velocity_m_s[2] = kRestitution * kSpeed;
+    std::vector<TouchPoint> points;
+    for (const auto& [x, y] : {std::pair(1, 1), std::pair(-1, -1), std::pair(1, -1), std::pair(-1, 1)})
+      if (points.size() < given) points.push_back(on_ground(0, {x * kHalf, y * kHalf, 0.0}, impulse / static_cast<double>(given)));
+    rig.step(1e-4, points);
+    for (int n = 0; n < 300; ++n) rig.step(1e-4, {});
+    EXPECT_LE(rig.sum_impulses(0)[2], 1.001 * impulse) << given;
+    EXPECT_GE(rig.sum_impulses(0)[2], 0.8 * impulse) << given;
+    auto forces = rig.list<events::Force>();
+    std::sort(forces.begin(), forces.end(),
+              [](const auto& x, const auto& y) { return std::pair(x.triangle, x.time_s) < std::pair(y.triangle, y.time_s); });
+    if (given == 4) whole = forces;
+    ASSERT_EQ(forces.size(), whole.size());
+    for (std::size_t k = 0; k < whole.size(); ++k)
+      EXPECT_NEAR(events::calc_impulse(forces[k])[2], events::calc_impulse(whole[k])[2], 1e-3 * impulse) << k;
+  }
+}
+
 TEST(TouchEnergy, ImpactsBeyondTheWorkOfMaxImpactsAreSimplified) {
   constexpr int kPlates = 12;
   const bank::Bank plate = physics::tests::make_plate_bank(0.2, 2e-3, 8000.0, 8, 1.0);

@@ -1,0 +1,89 @@
+#include "runtime/drive/corners.hpp"
+
+#include <algorithm>
+#include <span>
+
+#include "runtime/base/quaternion.hpp"
+
+namespace carillon::drive {
+namespace {
+
+constexpr double kOnSurfaceRatio = 1e-3;  // of the size: distance from the other surface
+constexpr double kFlatnessRatio = 0.02;   // of the size: from its plane
+
+/// Pose of a body at a hit; of the ground the world's.
+struct Pose {
+  Mat3 rotation{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+  Vec3 origin_m{};
+
+  Vec3 to_world(const Vec3& x) const { return rotation * x + origin_m; }
+  Vec3 to_body(const Vec3& x) const { return turn_back(rotation, x - origin_m); }
+};
+
+Pose calc_pose(const StepView& step, const FinishedHit& hit, std::size_t side) {
+  const int body = side == 0 ? hit.a : hit.b;
+  if (body < 0) return {};
+  const Motion& before = hit.before[side];
+  const double moved_s = hit.touch_s - hit.opened_s;
+  Pose pose{.rotation = make_rotation(make_turn(moved_s * before.spin_rad_s)) * before.rotation};
+  pose.origin_m = before.centre_m + moved_s * before.velocity_m_s - pose.rotation * step.scene.bodies[body].centre_m;
+  return pose;
+}
+
+/// True if a body has a surface at this point, or is a plane.
+bool is_on_surface(const StepView& step, int body, const Vec3& station, const Vec3& outward, double size_m) {
+  const TouchBody* b = body < 0 ? nullptr : &step.bodies[body];
+  if (b == nullptr || (b->shape == nullptr && b->given.fixed)) return true;
+  if (b->shape == nullptr) return false;
+  const geometry::Place place = b->shape->find_place(station, outward);
+  Vec3 nearest{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::int32_t vertex = b->given.bank->triangles[place.triangle][k];
+    nearest = nearest + place.barycentric[k] * b->given.bank->vertices_m[vertex];
+  }
+  return norm(nearest - station) < kOnSurfaceRatio * size_m;
+}
+
+/// True if another corner lies under this one, as on the lower side of a sheet.
+bool is_covered(std::span<const Vec3> corners, const Vec3& corner, const Vec3& up) {
+  return std::any_of(corners.begin(), corners.end(), [&](const Vec3& other) {
+    const Vec3 way = corner - other;
+    const double rise = dot(up, way);
+    return rise > norm(way - rise * up);
+  });
+}
+
+}  // namespace
+
+std::vector<Corner> find_corners(const StepView& step, const FinishedHit& hit, double reach_m) {
+  const double size_m = step.scene.calc_size(hit.a, hit.b);
+  const std::array<Pose, 2> poses{calc_pose(step, hit, 0), calc_pose(step, hit, 1)};
+  std::vector<Corner> corners;
+  for (const std::size_t side : {0, 1}) {
+    const int body = side == 0 ? hit.a : hit.b, other = side == 0 ? hit.b : hit.a;
+    if (body < 0 || !step.bodies[body].edges) continue;
+    const Vec3 up = side == 0 ? hit.normal : -1.0 * hit.normal;  // from the surface of the other body
+    const std::span<const Vec3> all = step.bodies[body].edges->get_corners();
+    const Vec3 own = poses[side].to_world(hit.stations_m[side]), others = poses[1 - side].to_world(hit.stations_m[1 - side]);
+    for (const Vec3& station : all) {
+      const Vec3 where = poses[side].to_world(station);
+      const double gap_m = dot(up, where - own);  // engines find bodies only when they overlap
+      const Vec3 foot = poses[1 - side].to_body(where - dot(up, where - others) * up);
+      if (std::abs(gap_m) > kFlatnessRatio * size_m || is_covered(all, station, turn_back(poses[side].rotation, up)) ||
+          !is_on_surface(step, other, foot, turn_back(poses[1 - side].rotation, up), size_m))
+        continue;
+      Corner& corner = corners.emplace_back();
+      corner.stations_m[side] = station;
+      corner.stations_m[1 - side] = foot;
+      corner.gap_m = gap_m;
+    }
+  }
+  const auto first = std::min_element(corners.begin(), corners.end(), [](const Corner& x, const Corner& y) { return x.gap_m < y.gap_m; });
+  if (first == corners.end()) return corners;
+  const double lowest_m = first->gap_m;
+  for (Corner& corner : corners) corner.gap_m -= lowest_m;
+  std::erase_if(corners, [&](const Corner& corner) { return corner.gap_m > reach_m; });
+  return corners;
+}
+
+}  // namespace carillon::drive
