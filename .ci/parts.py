@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests/support"))
 import ctest
 
-GROUPS = (("ranks", "slow", "core"), ("programs", "bench"), ("docs", "integration"), ("sanitizers", "tidy", "threads"))
+GROUPS = (("ranks", "slow", "core"), ("programs", "bench", "tidy", "threads"), ("docs", "integration"), ("sanitizers",))
 
 
 def choose(record, commit_count):
@@ -97,7 +97,7 @@ def self_test():
     assert len(find_faults({"a": ["unit"], "b": ["part.basic", "part.slow"], "c": ["part.new"]})) == 3
     # Without a record, four commits in a row run everything.
     assert {part for count in range(7, 11) for part in choose({}, count)[1]} == every
-    assert "due in 3 submissions: sanitizers tidy threads" in describe(0, ["ranks", "slow"], {"turn": 3, "failed": []})
+    assert "due in 3 submissions: sanitizers" in describe(0, ["ranks", "slow"], {"turn": 3, "failed": []})
     assert "run again: docs" in describe(0, ["ranks", "slow", "docs"], {"turn": 3, "failed": ["docs"]})
 
 
