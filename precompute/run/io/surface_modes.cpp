@@ -198,7 +198,7 @@ std::vector<std::int16_t> SurfaceWork::collect() {
       MPI_Send(&steps_[i * row], static_cast<int>(std::min(rows_at_a_time, own_ - i) * row), MPI_INT16_T, 0, kStepsTag, comm_);
     return {};
   }
-  for (std::size_t i = 0; i < own_; ++i) std::copy_n(&steps_[i * row], row, &shape[vertex_[i] * row]);
+  for (std::size_t i = 0; i < own_; ++i) std::copy_n(steps_.data() + i * row, row, shape.data() + vertex_[i] * row);
   steps_ = {};
   std::size_t at = own_;
   for (int from = 1; from < comm_.size(); ++from) {
@@ -206,7 +206,7 @@ std::vector<std::int16_t> SurfaceWork::collect() {
     for (std::size_t done = 0; done < theirs; done += rows_at_a_time) {
       const std::size_t now = std::min(rows_at_a_time, theirs - done);
       MPI_Recv(arrived.data(), static_cast<int>(now * row), MPI_INT16_T, from, kStepsTag, comm_, MPI_STATUS_IGNORE);
-      for (std::size_t i = 0; i < now; ++i) std::copy_n(&arrived[i * row], row, &shape[vertex_[at++] * row]);
+      for (std::size_t i = 0; i < now; ++i) std::copy_n(arrived.data() + i * row, row, shape.data() + vertex_[at++] * row);
     }
   }
   return shape;
