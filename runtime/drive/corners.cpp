@@ -1,9 +1,11 @@
 #include "runtime/drive/corners.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "runtime/base/quaternion.hpp"
+#include "runtime/physics/rigid/limits.hpp"
 
 namespace carillon::drive {
 namespace {
@@ -55,7 +57,19 @@ bool is_covered(std::span<const Vec3> corners, const Vec3& corner, const Vec3& u
 
 }  // namespace
 
-std::vector<Corner> find_corners(const StepView& step, const FinishedHit& hit, double reach_m) {
+double calc_approach_before(const StepView& step, const FinishedHit& hit, const std::array<Vec3, 2>& stations) {
+  std::array<Vec3, 2> velocities{};
+  for (const std::size_t side : {0, 1}) {
+    const int body = side == 0 ? hit.a : hit.b;
+    if (body < 0) continue;
+    const Motion& before = hit.before[side];
+    const Vec3 lever = before.rotation * (stations[side] - step.scene.bodies[body].centre_m);
+    velocities[side] = before.velocity_m_s + cross(before.spin_rad_s, lever);
+  }
+  return dot(hit.normal, velocities[1] - velocities[0]);
+}
+
+std::vector<Corner> find_corners(const StepView& step, const FinishedHit& hit, double within_s) {
   const double size_m = step.scene.calc_size(hit.a, hit.b);
   const std::array<Pose, 2> poses{calc_pose(step, hit, 0), calc_pose(step, hit, 1)};
   std::vector<Corner> corners;
@@ -64,25 +78,25 @@ std::vector<Corner> find_corners(const StepView& step, const FinishedHit& hit, d
     if (body < 0 || !step.bodies[body].edges) continue;
     const Vec3 up = side == 0 ? hit.normal : -1.0 * hit.normal;  // from the surface of the other body
     const std::span<const Vec3> all = step.bodies[body].edges->get_corners();
-    const Vec3 own = poses[side].to_world(hit.stations_m[side]), others = poses[1 - side].to_world(hit.stations_m[1 - side]);
+    const Vec3 own = poses[side].to_world(hit.stations_m[side]);
+    const Vec3 level = other < 0 ? own : poses[1 - side].to_world(hit.stations_m[1 - side]);
     for (const Vec3& station : all) {
       const Vec3 where = poses[side].to_world(station);
-      const double gap_m = dot(up, where - own);  // engines find bodies only when they overlap
-      const Vec3 foot = poses[1 - side].to_body(where - dot(up, where - others) * up);
-      if (std::abs(gap_m) > kFlatnessRatio * size_m || is_covered(all, station, turn_back(poses[side].rotation, up)) ||
-          !is_on_surface(step, other, foot, turn_back(poses[1 - side].rotation, up), size_m))
-        continue;
-      Corner& corner = corners.emplace_back();
+      Corner corner{.gap_m = dot(up, where - own)};  // not from the other surface: engines find bodies only when they overlap
+      if (!(std::abs(corner.gap_m) <= kFlatnessRatio * size_m)) continue;
       corner.stations_m[side] = station;
-      corner.stations_m[1 - side] = foot;
-      corner.gap_m = gap_m;
+      corner.stations_m[1 - side] = poses[1 - side].to_body(where - dot(up, where - level) * up);
+      corner.approach_m_s = calc_approach_before(step, hit, corner.stations_m);
+      if (corner.approach_m_s > rigid::kMinImpactSpeedMS && !is_covered(all, station, turn_back(poses[side].rotation, up)) &&
+          is_on_surface(step, other, corner.stations_m[1 - side], turn_back(poses[1 - side].rotation, up), size_m))
+        corners.push_back(corner);
     }
   }
   const auto first = std::min_element(corners.begin(), corners.end(), [](const Corner& x, const Corner& y) { return x.gap_m < y.gap_m; });
   if (first == corners.end()) return corners;
   const double lowest_m = first->gap_m;
   for (Corner& corner : corners) corner.gap_m -= lowest_m;
-  std::erase_if(corners, [&](const Corner& corner) { return corner.gap_m > reach_m; });
+  std::erase_if(corners, [&](const Corner& corner) { return !(corner.gap_m <= within_s * corner.approach_m_s); });
   return corners;
 }
 

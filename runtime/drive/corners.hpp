@@ -12,11 +12,15 @@ namespace carillon::drive {
 /// A corner of one body over a surface of the other.
 struct Corner {
   std::array<Vec3, 2> stations_m{};  // on a and b, mesh frames; of the ground in the world
+  double approach_m_s = 0.0;         // > 0: closing
   double gap_m = 0.0;                // when the first corner touches
 };
 
-/// Corners that are nearer than `reach_m` to the surface at a hit when the first of them touches: engines may stop a face that lands by two
-/// of its corners. Ground and fixed bodies without a surface are planes.
-std::vector<Corner> find_corners(const StepView& step, const FinishedHit& hit, double reach_m);
+/// Closing speed of the two bodies of a hit at other stations, in the motion before it [m/s].
+double calc_approach_before(const StepView& step, const FinishedHit& hit, const std::array<Vec3, 2>& stations_m);
+
+/// Corners that close, and touch within `within_s` of the first of them, in the motion before a hit. Ground and fixed bodies without a bank
+/// are planes; none on moving bodies without a bank, nor on bodies with too many corners (SharpEdges).
+std::vector<Corner> find_corners(const StepView& step, const FinishedHit& hit, double within_s);
 
 }  // namespace carillon::drive

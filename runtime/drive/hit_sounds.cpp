@@ -2,7 +2,7 @@
 // impact is integrated from the motions before it. If the engine's impulse is less than that of rigid bodies with the same motions, the
 // forces are scaled by the ratio: the engine knows nothing of the modes' momentum. They are reduced further if the modes would have more
 // energy than the blows have given, at the end or at any instant. Simultaneous hits of two bodies, as of both ends of
-// a tube, are one impact, together with the contacts on which these bodies rest.
+// a tube, are one impact, together with the contacts on which these bodies rest and with further corners of a face that lands.
 // Source: runtime/physics/impact; K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 #include "runtime/drive/hit_sounds.hpp"
 
@@ -15,7 +15,6 @@
 #include <utility>
 
 #include "runtime/base/groups.hpp"
-#include "runtime/drive/corners.hpp"
 #include "runtime/physics/impact/impact.hpp"
 #include "runtime/physics/impact/predict.hpp"
 #include "runtime/physics/rigid/limits.hpp"
@@ -39,7 +38,7 @@ constexpr int kPulsePieces = 16;          // of a Hertz pulse, for its energy at
 constexpr double kRattleShare = 0.1;      // of that speed where bodies rattle: slower hits are part of it
 constexpr double kLongestRattleS = 0.1;   // s
 constexpr double kTogetherPulses = 2.0;   // Hertz times; hits of two bodies that begin within them are one impact
-constexpr double kFacePartRatio = 0.25;   // of that time: corners join a face after such parts
+constexpr double kFacePartRatio = 0.25;   // of a Hertz time; springs of faces are updated so often
 constexpr double kSamePlaceRatio = 0.05;  // of the size
 constexpr std::size_t kMaxTogether = 4;   // hits of an impact,
 constexpr std::size_t kMaxContacts = 8;   // and contacts, with those of supports: the cost of a step is quadratic in them
@@ -205,8 +204,10 @@ std::vector<HitSounds::Contact> HitSounds::gather(const StepView& step, std::spa
       chosen.push_back(i);
   }
   if (chosen.size() == 1) return alone;
-  // The earliest has the motions before the impact.
-  std::stable_sort(chosen.begin(), chosen.end(), [&](std::size_t i, std::size_t j) { return hits[i]->opened_s < hits[j]->opened_s; });
+  // The earliest has the motions before the impact, and supports, which a shared hit has not.
+  std::stable_sort(chosen.begin(), chosen.end(), [&](std::size_t i, std::size_t j) {
+    return std::pair(hits[i]->is_shared, hits[i]->opened_s) < std::pair(hits[j]->is_shared, hits[j]->opened_s);
+  });
   std::vector<Contact> together;
   for (const std::size_t i : chosen) together.push_back(make_contact(step, *hits[i]));
   if (std::none_of(together.begin(), together.end(), [](const Contact& c) { return c.needs_modes(); })) return alone;
@@ -490,43 +491,78 @@ bool HitSounds::advance(impact::Impact& impact, std::span<const impact::FaceCorn
 /// their supports.
 HitSounds::Setup HitSounds::choose_contacts(const StepView& step, const std::vector<Contact>& hits) const {
   const FinishedHit& first = hits.front().hit;
-  Setup setup{.touch_s = first.touch_s, .contacts = hits};
+  const bool are_sharp = std::all_of(hits.begin(), hits.end(), [&](const Contact& c) { return is_sharp(step, c.hit); });
+  std::vector<Corner> corners;
+  if (are_sharp) corners = find_corners(step, first, kTogetherPulses * hits.front().blow.duration_s);
+  Setup setup;
+  setup.made.reserve(hits.size() + corners.size());
+  setup.touch_s = first.touch_s;
   for (const Contact& c : hits) setup.touch_s = std::min(setup.touch_s, c.hit.touch_s);
-  for (const Contact& c : hits) setup.gaps_m.push_back((c.hit.touch_s - setup.touch_s) * c.hit.approach_m_s);
-  const std::vector<Corner> corners = find_corners(step, first, kTogetherPulses * hits.front().blow.duration_s * first.approach_m_s);
-  const double near_m = kSamePlaceRatio * step.scene.calc_size(first.a, first.b);
-  std::vector<const Corner*> of_hits;
   for (const Contact& c : hits) {
-    const auto is_here = [&](const Corner& corner) { return norm(corner.stations_m[0] - c.hit.stations_m[0]) < near_m; };
-    const auto found = std::find_if(corners.begin(), corners.end(), is_here);
-    if (found != corners.end()) of_hits.push_back(&*found);
-  }
-  setup.silent.reserve(corners.size());
-  if (of_hits.size() == hits.size()) {
-    for (std::size_t i = 0; i < hits.size(); ++i) setup.gaps_m[i] = of_hits[i]->gap_m;
-    for (const Corner& corner : corners) {
-      if (setup.contacts.size() == kMaxContacts || std::find(of_hits.begin(), of_hits.end(), &corner) != of_hits.end()) continue;
-      const FinishedHit& hit = setup.silent.emplace_back(FinishedHit{.a = first.a,
-                                                                     .b = first.b,
-                                                                     .touch_s = setup.touch_s,
-                                                                     .approach_m_s = first.approach_m_s,
-                                                                     .curvature_per_m = TouchPoint::kUnknown,
-                                                                     .normal = first.normal,
-                                                                     .stations_m = corner.stations_m,
-                                                                     .outwards = first.outwards,
-                                                                     .before = first.before});
+    if (c.hit.opened_s == first.opened_s) {
+      setup.contacts.push_back(c);
+    } else {  // its own motion before is after the first blow
+      FinishedHit& hit = setup.made.emplace_back(c.hit);
+      hit.before = first.before;
+      hit.approach_m_s = calc_approach_before(step, first, hit.stations_m);
       setup.contacts.push_back(make_contact(step, hit));
-      setup.gaps_m.push_back(corner.gap_m);
     }
+    const FinishedHit& hit = setup.contacts.back().hit;
+    setup.gaps_m.push_back((hit.touch_s - setup.touch_s) * std::max(hit.approach_m_s, 0.0));
   }
-  setup.struck = setup.contacts.size();
+  std::vector<const FinishedHit*> supports;
   for (const FinishedHit& support : first.supports) {
     const auto is_same = [&](const Contact& c) { return c.hit.spot == support.spot; };
-    if (setup.contacts.size() == kMaxContacts || std::any_of(hits.begin(), hits.end(), is_same)) continue;
-    setup.contacts.push_back(make_contact(step, support));
-    setup.gaps_m.push_back(0.0);
+    if (hits.size() + supports.size() < kMaxContacts && std::none_of(hits.begin(), hits.end(), is_same)) supports.push_back(&support);
+  }
+  add_corners(step, first, corners, supports, setup);
+  setup.struck = setup.contacts.size();
+  for (const FinishedHit* support : supports) {
+    setup.contacts.push_back(make_contact(step, *support));
+    setup.gaps_m.push_back(0.0);  // closed
   }
   return setup;
+}
+
+/// Adds corners without a hit or a support to the hits of a setup, if each hit is at a corner: an engine may stop a landing face at only
+/// two of its corners.
+void HitSounds::add_corners(const StepView& step, const FinishedHit& first, std::span<const Corner> corners,
+                            std::span<const FinishedHit* const> supports, Setup& setup) const {
+  const double near_m = kSamePlaceRatio * step.scene.calc_size(first.a, first.b);
+  const auto calc_distance = [](const Corner& corner, const FinishedHit& hit) { return norm(corner.stations_m[0] - hit.stations_m[0]); };
+  std::vector<double> gaps_m;
+  for (const Contact& c : setup.contacts) {
+    const auto nearest = std::min_element(corners.begin(), corners.end(), [&](const Corner& x, const Corner& y) {
+      return calc_distance(x, c.hit) < calc_distance(y, c.hit);
+    });
+    if (nearest == corners.end() || !(calc_distance(*nearest, c.hit) < near_m)) return;
+    gaps_m.push_back(nearest->gap_m);
+  }
+  setup.gaps_m = std::move(gaps_m);
+  std::vector<const Corner*> added;
+  for (const Corner& corner : corners) {
+    const auto is_near = [&](const Corner* other) { return norm(corner.stations_m[0] - other->stations_m[0]) < near_m; };
+    const auto is_hit = [&](const Contact& c) { return calc_distance(corner, c.hit) < near_m; };
+    const auto is_support = [&](const FinishedHit* s) { return s->a == first.a && s->b == first.b && calc_distance(corner, *s) < near_m; };
+    if (std::none_of(setup.contacts.begin(), setup.contacts.end(), is_hit) && std::none_of(supports.begin(), supports.end(), is_support) &&
+        std::none_of(added.begin(), added.end(), is_near))
+      added.push_back(&corner);
+  }
+  // Part of a face would turn the body; hits beyond kMaxTogether are sounded apart.
+  if (setup.contacts.size() >= kMaxTogether || setup.contacts.size() + added.size() + supports.size() > kMaxContacts) return;
+  for (const Corner* corner : added) {
+    const FinishedHit& hit = setup.made.emplace_back(FinishedHit{.a = first.a,
+                                                                 .b = first.b,
+                                                                 .touch_s = setup.touch_s,
+                                                                 .approach_m_s = corner->approach_m_s,
+                                                                 .curvature_per_m = TouchPoint::kUnknown,
+                                                                 .normal = first.normal,
+                                                                 .stations_m = corner->stations_m,
+                                                                 .outwards = first.outwards,
+                                                                 .before = first.before});
+    setup.contacts.push_back(make_contact(step, hit));
+    setup.gaps_m.push_back(corner->gap_m);
+  }
 }
 
 HitSounds::Setup HitSounds::set_up(const StepView& step, const std::vector<Contact>& hits) {
@@ -571,8 +607,9 @@ HitSounds::Setup HitSounds::set_up(const StepView& step, const std::vector<Conta
 /// False if it cannot be integrated: nothing is appended.
 bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits, TouchesCounters& counters,
                           std::vector<events::Event>& events) {
-  double hertz_s = 0.0, wanted = 0.0, blow_j = 0.0, most_j = 0.0;
+  double hertz_s = 0.0, end_s = 0.0, wanted = 0.0, blow_j = 0.0, most_j = 0.0;
   for (const Contact& c : hits) {
+    end_s = std::max(end_s, c.hit.end_s);
     hertz_s = std::max(hertz_s, c.blow.duration_s);
     wanted += c.hit.push_n_s;
     blow_j += c.hit.energy_share * c.rigid.calc_energy_j();
@@ -603,7 +640,7 @@ bool HitSounds::integrate(const StepView& step, const std::vector<Contact>& hits
   const double scale = keep_ringing(*impact, setup.bodies, struck, touch_s, largest, blow_j, most_j);
   if (scale < largest) ++counters.limited;
   counters.impacts += std::ssize(hits);
-  for (const Contact& c : std::span(setup.contacts).subspan(setup.struck)) included_s_[c.hit.spot] = hits.front().hit.end_s;
+  for (const Contact& c : std::span(setup.contacts).subspan(setup.struck)) included_s_[c.hit.spot] = end_s;
   for (std::size_t i = 0; i < setup.contacts.size(); ++i) {
     const Contact& c = setup.contacts[i];
     if (c.hit.spot != 0) rattles_s_[c.hit.spot] = find_rattle_end(step, c, touch_s + impact->get_time());

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "runtime/drive/corners.hpp"
 #include "runtime/drive/lasting.hpp"
 #include "runtime/drive/pulses.hpp"
 #include "runtime/drive/ringing.hpp"
@@ -61,19 +62,21 @@ class HitSounds {
     bool needs_modes() const;
   };
 
-  /// An impact before its integration. `contacts`: the hits, `silent` corners without an impulse of the engine, then supports; lengths of
-  /// the others: one per contact.
+  /// An impact before its integration. `contacts`: hits, added corners, then supports; they refer to `made`. `gaps_m`, `shapes`, `springs`,
+  /// `faces`: one per contact; `bodies`, `names`: one per body.
   struct Setup {
+    Setup() = default;
+    Setup(Setup&&) = default;
     double touch_s = 0.0;
-    std::vector<FinishedHit> silent{};
-    std::vector<Contact> contacts{};
+    std::vector<FinishedHit> made;
+    std::vector<Contact> contacts;
     std::size_t struck = 0;  // contacts that are no supports
-    std::vector<double> gaps_m{};
-    std::vector<std::array<std::vector<double>, 2>> shapes{};  // of a and b, world axes
-    std::vector<impact::Contact> springs{};
-    std::vector<impact::FaceCorner> faces{};
-    std::vector<impact::Body> bodies{};
-    std::vector<int> names{};  // of the bodies
+    std::vector<double> gaps_m;
+    std::vector<std::array<std::vector<double>, 2>> shapes;  // of a and b, world axes
+    std::vector<impact::Contact> springs;
+    std::vector<impact::FaceCorner> faces;
+    std::vector<impact::Body> bodies;
+    std::vector<int> names;  // of the bodies
   };
 
   static RigidBlow make_rigid(const FinishedHit& hit);
@@ -88,6 +91,8 @@ class HitSounds {
   static std::vector<double> calc_rigid_pushes(const StepView& step, std::span<const FinishedHit* const> hits);
   static void join_predicted(const StepView& step, std::vector<FinishedHit>& hits);
   bool advance(impact::Impact& impact, std::span<const impact::FaceCorner> faces, double hertz_s);
+  void add_corners(const StepView& step, const FinishedHit& first, std::span<const Corner> corners,
+                   std::span<const FinishedHit* const> supports, Setup& setup) const;
   Setup choose_contacts(const StepView& step, const std::vector<Contact>& hits) const;
   Setup set_up(const StepView& step, const std::vector<Contact>& hits);
   bool integrate(const StepView& step, const std::vector<Contact>& contacts, TouchesCounters& counters, std::vector<events::Event>& events);

@@ -12,11 +12,11 @@ namespace carillon::impact {
 struct FaceCorner {
   bool is_sharp = false;  // false: of a curved surface, its spring is its own
   Vec3 where_m{}, normal{};
-  double size_m = 0.0, compliance_per_pa = 0.0;  // of the two bodies
+  double size_m = 0.0, compliance_per_pa = 0.0;  // of the smaller body; of both, 1/E*
 };
 
-/// Springs of an impact, of which `springs` has those of open contacts as single points: three corners of a face or more share its
-/// stiffness once each is pressed deeper than `flat_m`, the flatness of faces, within `ahead_s`. Lengths: one per contact of the impact.
+/// In and out: `springs`, one per contact as `corners`; of open contacts that of a single point, of compressed ones the present spring.
+/// Three corners of a face or more get equal shares of its stiffness once each is pressed deeper than `flat_m` [m] within `ahead_s` [s].
 void share_faces(const Impact& impact, std::span<const FaceCorner> corners, double flat_m, double ahead_s, std::span<Spring> springs);
 
 }  // namespace carillon::impact

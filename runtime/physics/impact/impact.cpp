@@ -82,14 +82,17 @@ int Impact::join(const Body& body) {
   return static_cast<int>(bodies_.size()) - 1;
 }
 
+void Impact::check_spring(const Spring& spring) {
+  check(spring.stiffness > 0.0 && std::isfinite(spring.stiffness) && spring.exponent >= 1.0, "invalid contact spring");
+}
+
 void Impact::check_contact(const Contact& contact) const {
   const auto count = static_cast<int>(bodies_.size());
   check(contact.a >= 0 && contact.a < count && contact.b >= -1 && contact.b < count && contact.a != contact.b,
         "contact does not name two different bodies");
   check(std::abs(dot(contact.normal, contact.normal) - 1.0) < 1e-6, "normal is not a unit vector");
   check(is_finite(contact.where_m) && std::isfinite(contact.gap_m), "contact position or gap is not finite");
-  check(contact.spring.stiffness > 0.0 && std::isfinite(contact.spring.stiffness) && contact.spring.exponent >= 1.0,
-        "invalid contact spring");
+  check_spring(contact.spring);
   check(contact.restitution >= 0.0 && contact.friction >= 0.0 && contact.tangential_ratio > 0.0,
         "restitution, friction or tangential ratio out of range");
   for (const bool first : {true, false}) {
@@ -234,6 +237,7 @@ ElasticPulse Impact::set_law(int contact, double inverse_mass, double speed_m_s)
 }
 
 void Impact::exchange_spring(int contact, const Spring& spring) {
+  check_spring(spring);
   ContactLaw& law = laws_[contact];
   History& history = contacts_[contact];
   const double before_m = law.compression_m, after_m = calc_compression(spring, calc_spring_energy(law.spring, before_m));

@@ -115,8 +115,8 @@ class Impact {
   /// constructor.
   void update(std::span<const Body> bodies, std::span<const Contact> contacts);
 
-  /// Keeps the energies of the spring and its anchor; the remaining compression becomes yielded. A compressed contact keeps its spring if the
-  /// new one is softer.
+  /// Replaces the spring of a contact, but for its hysteresis. Energies of spring and anchor stay; the compression that is left becomes
+  /// yielded. A compressed contact keeps its spring if the new one is softer. Throws like the constructor.
   void exchange_spring(int contact, const Spring& spring);
 
   /// Changes the velocity of a body instantaneously, as other contacts do; the energy change is booked as given. Throws for non-finite
@@ -170,6 +170,7 @@ class Impact {
 
   void check_contact(const Contact& contact) const;
   static void check_body(const Body& body);
+  static void check_spring(const Spring& spring);
   void place_body(Body body);
   void add_contact(const Contact& contact);
   void place_contact(const Contact& contact, int index, int row);

@@ -88,7 +88,10 @@ TEST(TouchEnergy, FaceThatLandsStrikesWithAllItsCorners) {
   const bank::Bank slab = physics::tests::make_box({1.0, 1.0, 0.1}, {4, 4, 1});
   const TouchesBody of_bank{.body = 1, .fixed = true, .bank = &slab, .name_hash = 1, .friction = 0.5},
       silent{.body = -1, .fixed = true, .name_hash = 2, .young_pa = 3e10, .poisson = 0.2, .density_kg_m3 = 2400.0, .size_m = 1.5};
-  for (const TouchesBody* floor : {static_cast<const TouchesBody*>(nullptr), &of_bank, &silent}) {
+  TouchesBody moving = of_bank, renamed = of_bank;
+  moving.fixed = false;
+  renamed.name_hash = ~0ULL;  // the other order of the pair
+  for (const TouchesBody* floor : std::initializer_list<const TouchesBody*>{nullptr, &of_bank, &silent, &moving, &renamed}) {
     const auto whole = land({{1, 1}, {-1, -1}, {1, -1}, {-1, 1}}, floor), opposite = land({{1, 1}, {-1, -1}}, floor);
     std::set<std::int32_t> places;
     Vec3 sum{};
@@ -101,6 +104,28 @@ TEST(TouchEnergy, FaceThatLandsStrikesWithAllItsCorners) {
     for (std::size_t k = 0; k < whole.size(); ++k)
       EXPECT_NEAR(events::calc_impulse(opposite[k])[2], events::calc_impulse(whole[k])[2], 1e-3 * sum[2]) << k;
   }
+}
+
+/// A spinning plate that lands on one edge, while the other rises: the whole impulse of the engine, on that edge alone.
+TEST(TouchEnergy, CornersThatRiseStrikeNothing) {
+  constexpr double kHalf = 0.1, kSpeed = 0.2, kSpin = 10.0, kRestitution = 0.5;
+  const bank::Bank plate = physics::tests::make_plate_bank(2.0 * kHalf, 5e-3, 8000.0, 8, 1.0);
+  const double mass = plate.rigid.mass_kg, inertia = plate.rigid.inertia_kg_m2[4];
+  const double impulse = (1.0 + kRestitution) * (kSpeed + kSpin * kHalf) / (1.0 / mass + kHalf * kHalf / inertia);
+  Rig rig({.ground_restitution = kRestitution});
+  rig.add(plate, "plate", {0, 0, 2.5e-3}, {0, 0, -kSpeed}, kRestitution);
+  rig.poses[0].spin_rad_s = {0, kSpin, 0};  // x > 0 goes down
+  rig.start();
+  rig.step(1e-4, {});
+  rig.poses[0].velocity_m_s[2] += impulse / mass;
+  rig.poses[0].spin_rad_s[1] -= kHalf * impulse / inertia;
+  rig.step(1e-4, {on_ground(0, {kHalf, kHalf, 0.0}, 0.5 * impulse), on_ground(0, {kHalf, -kHalf, 0.0}, 0.5 * impulse)});
+  for (int n = 0; n < 300; ++n) rig.step(1e-4, {});
+  std::set<std::int32_t> places;
+  for (const events::Force& force : rig.list<events::Force>()) places.insert(force.triangle);
+  EXPECT_EQ(places.size(), 2U);
+  EXPECT_GE(rig.sum_impulses(0)[2], 0.8 * impulse);
+  EXPECT_LE(rig.sum_impulses(0)[2], 1.001 * impulse);
 }
 
 /// Corners that hang over the edge of a slab strike nothing.
