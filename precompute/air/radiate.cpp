@@ -333,7 +333,7 @@ Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, 
     const double size = norm(twice);
     const Vec3 normal = size > 0.0 ? (1.0 / size) * twice : Vec3{};
     for (std::size_t c = 0; c < 3; ++c) {
-      const std::int16_t* step = bank.shape.data() + static_cast<std::size_t>(triangle[c]) * modes * 3;
+      const std::int16_t* step = bank.get_steps(static_cast<std::size_t>(triangle[c]));
       for (std::size_t m = 0; m < modes; ++m, step += 3)
         radiator.velocity.push_back(
             static_cast<float>(bank.shape_scale[m] * (step[0] * normal[0] + step[1] * normal[1] + step[2] * normal[2])));

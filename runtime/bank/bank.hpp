@@ -187,9 +187,11 @@ struct Bank {
   std::size_t mode_count() const { return eigenvalue_rad2_s2.size(); }
   std::size_t vertex_count() const { return vertices_m.size(); }
   double freq_hz(std::size_t mode) const;  // undamped, sqrt(lambda) / 2 pi
+  /// Steps of all modes at a vertex, (modes, 3); may point nowhere where there are no modes.
+  const std::int16_t* get_steps(std::size_t vertex) const { return shape.data() + vertex * mode_count() * 3; }
   /// phi of `mode` at `vertex` [kg^-1/2].
   Vec3 shape_at(std::size_t vertex, std::size_t mode) const {
-    const std::int16_t* s = &shape[(vertex * mode_count() + mode) * 3];
+    const std::int16_t* s = get_steps(vertex) + 3 * mode;
     const double k = shape_scale[mode];
     return {s[0] * k, s[1] * k, s[2] * k};
   }

@@ -70,7 +70,7 @@ double calc_heard(const std::vector<double>& weight, const Vec3& normal, const s
 
 Blows::Blows(const Bank& bank) : skin(find_skin(bank)), weight(calc_weights(bank)), exposure(bank.vertex_count()) {
   for (std::size_t v = 0; v < exposure.size(); ++v) {
-    exposure[v] = calc_heard(weight, skin.normal[v], bank.shape.data() + v * bank.mode_count() * 3);
+    exposure[v] = calc_heard(weight, skin.normal[v], bank.get_steps(v));
     if (skin.area_m2[v] > 0.0) quietest = std::max(quietest, kQuietest * exposure[v]);
   }
   for (double& heard : exposure) heard = std::max(heard, quietest);
@@ -97,7 +97,7 @@ Check check_packing(const Bank& bank) {
     const std::size_t v = packing.witness[i];
     const std::int16_t* own = packing.witness_shape.data() + i * bank.mode_count() * 3;
     const Vec3& normal = blows.skin.normal[v];
-    const double missed = calc_heard(blows.weight, normal, own, bank.shape.data() + v * bank.mode_count() * 3);
+    const double missed = calc_heard(blows.weight, normal, own, bank.get_steps(v));
     const double here_db = calc_db(missed, std::max(calc_heard(blows.weight, normal, own), blows.quietest));
     worst_db = std::max(worst_db, here_db);
     if (here_db > packing.error_db + kRoundingDb) ++above;

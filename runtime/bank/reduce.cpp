@@ -32,7 +32,7 @@ std::vector<double> calc_mean_squares(const Bank& bank) {
     if (!(size > 0.0)) continue;
     area += size;
     for (const std::int32_t vertex : triangle) {
-      const std::int16_t* row = bank.shape.data() + static_cast<std::size_t>(vertex) * bank.mode_count() * 3;
+      const std::int16_t* row = bank.get_steps(static_cast<std::size_t>(vertex));
       for (std::size_t m = 0; m < bank.mode_count(); ++m, row += 3) {
         const double steps = (row[0] * normal[0] + row[1] * normal[1] + row[2] * normal[2]) / size;
         sums[m] += size * steps * steps / 3.0;

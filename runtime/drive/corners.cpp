@@ -5,31 +5,23 @@
 #include <span>
 
 #include "runtime/base/quaternion.hpp"
+#include "runtime/physics/geometry/vectors.hpp"
+#include "runtime/physics/impact/face.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 
 namespace carillon::drive {
 namespace {
 
 constexpr double kOnSurfaceRatio = 1e-3;  // of the size: distance from the other surface
-constexpr double kFlatnessRatio = 0.02;   // of the size: from its plane
 
 /// Pose of a body at a hit; of the ground the world's.
-struct Pose {
-  Mat3 rotation{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
-  Vec3 origin_m{};
-
-  Vec3 to_world(const Vec3& x) const { return rotation * x + origin_m; }
-  Vec3 to_body(const Vec3& x) const { return turn_back(rotation, x - origin_m); }
-};
-
-Pose calc_pose(const StepView& step, const FinishedHit& hit, std::size_t side) {
+geometry::Frame calc_frame(const StepView& step, const FinishedHit& hit, std::size_t side) {
   const int body = side == 0 ? hit.a : hit.b;
   if (body < 0) return {};
   const Motion& before = hit.before[side];
   const double moved_s = hit.touch_s - hit.opened_s;
-  Pose pose{.rotation = make_rotation(make_turn(moved_s * before.spin_rad_s)) * before.rotation};
-  pose.origin_m = before.centre_m + moved_s * before.velocity_m_s - pose.rotation * step.scene.bodies[body].centre_m;
-  return pose;
+  const Mat3 rotation = make_rotation(make_turn(moved_s * before.spin_rad_s)) * before.rotation;
+  return {rotation, before.centre_m + moved_s * before.velocity_m_s - rotation * step.scene.bodies[body].centre_m};
 }
 
 /// True if a body has a surface at this point, or is a plane.
@@ -38,12 +30,7 @@ bool is_on_surface(const StepView& step, int body, const Vec3& station, const Ve
   if (b == nullptr || (b->shape == nullptr && b->given.fixed)) return true;
   if (b->shape == nullptr) return false;
   const geometry::Place place = b->shape->find_place(station, outward);
-  Vec3 nearest{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::int32_t vertex = b->given.bank->triangles[place.triangle][k];
-    nearest = nearest + place.barycentric[k] * b->given.bank->vertices_m[vertex];
-  }
-  return norm(nearest - station) < kOnSurfaceRatio * size_m;
+  return norm(bank::calc_point(*b->given.bank, place.triangle, place.barycentric) - station) < kOnSurfaceRatio * size_m;
 }
 
 /// True if another corner lies under this one, as on the lower side of a sheet.
@@ -62,33 +49,31 @@ double calc_approach_before(const StepView& step, const FinishedHit& hit, const 
   for (const std::size_t side : {0, 1}) {
     const int body = side == 0 ? hit.a : hit.b;
     if (body < 0) continue;
-    const Motion& before = hit.before[side];
-    const Vec3 lever = before.rotation * (stations[side] - step.scene.bodies[body].centre_m);
-    velocities[side] = before.velocity_m_s + cross(before.spin_rad_s, lever);
+    velocities[side] = step.calc_velocity(body, hit.before[side], hit.before[side], stations[side]);
   }
   return dot(hit.normal, velocities[1] - velocities[0]);
 }
 
 std::vector<Corner> find_corners(const StepView& step, const FinishedHit& hit, double within_s) {
   const double size_m = step.scene.calc_size(hit.a, hit.b);
-  const std::array<Pose, 2> poses{calc_pose(step, hit, 0), calc_pose(step, hit, 1)};
+  const std::array<geometry::Frame, 2> frames{calc_frame(step, hit, 0), calc_frame(step, hit, 1)};
   std::vector<Corner> corners;
   for (const std::size_t side : {0, 1}) {
     const int body = side == 0 ? hit.a : hit.b, other = side == 0 ? hit.b : hit.a;
     if (body < 0 || !step.bodies[body].edges) continue;
     const Vec3 up = side == 0 ? hit.normal : -1.0 * hit.normal;  // from the surface of the other body
     const std::span<const Vec3> all = step.bodies[body].edges->get_corners();
-    const Vec3 own = poses[side].to_world(hit.stations_m[side]);
-    const Vec3 level = other < 0 ? own : poses[1 - side].to_world(hit.stations_m[1 - side]);
+    const Vec3 own = to_world(frames[side], hit.stations_m[side]);
+    const Vec3 level = other < 0 ? own : to_world(frames[1 - side], hit.stations_m[1 - side]);
     for (const Vec3& station : all) {
-      const Vec3 where = poses[side].to_world(station);
+      const Vec3 where = to_world(frames[side], station);
       Corner corner{.gap_m = dot(up, where - own)};  // not from the other surface: engines find bodies only when they overlap
-      if (!(std::abs(corner.gap_m) <= kFlatnessRatio * size_m)) continue;
+      if (!(std::abs(corner.gap_m) <= impact::kFlatnessRatio * size_m)) continue;
       corner.stations_m[side] = station;
-      corner.stations_m[1 - side] = poses[1 - side].to_body(where - dot(up, where - level) * up);
+      corner.stations_m[1 - side] = to_body(frames[1 - side], where - dot(up, where - level) * up);
       corner.approach_m_s = calc_approach_before(step, hit, corner.stations_m);
-      if (corner.approach_m_s > rigid::kMinImpactSpeedMS && !is_covered(all, station, turn_back(poses[side].rotation, up)) &&
-          is_on_surface(step, other, corner.stations_m[1 - side], turn_back(poses[1 - side].rotation, up), size_m))
+      if (corner.approach_m_s > rigid::kMinImpactSpeedMS && !is_covered(all, station, turn_back(frames[side].rotation, up)) &&
+          is_on_surface(step, other, corner.stations_m[1 - side], turn_back(frames[1 - side].rotation, up), size_m))
         corners.push_back(corner);
     }
   }

@@ -407,14 +407,9 @@ bool HitSounds::advance(impact::Impact& impact, std::span<const impact::FaceCorn
   const double end_s = std::min({kLongestImpactS, kLongestPulses * hertz_s, most_s});
   const bool has_face = std::count_if(faces.begin(), faces.end(), [](const impact::FaceCorner& c) { return c.is_sharp; }) >= 3;
   const double part_s = has_face ? std::max(kFacePartRatio * hertz_s, impact.get_step_length()) : end_s;
-  std::vector<impact::Spring> alone;
-  for (int k = 0; k < std::ssize(faces); ++k) alone.push_back(impact.get_contact(k).spring);
   for (double to_s = part_s; !impact.has_ended() && impact.get_time() < end_s; to_s += part_s) {
     if (has_face) {
-      std::vector<impact::Spring> springs = alone;
-      for (int k = 0; k < std::ssize(faces); ++k)
-        if (impact.get_compression(k) > 0.0) springs[k] = impact.get_contact(k).spring;
-      impact::share_faces(impact, faces, rigid::kMaxDepthM, part_s, springs);
+      const std::vector<impact::Spring> springs = impact::find_springs(impact, faces, rigid::kMaxDepthM, part_s);
       for (int k = 0; k < std::ssize(faces); ++k)
         if (springs[k] != impact.get_contact(k).spring) impact.exchange_spring(k, springs[k]);
     }

@@ -51,7 +51,7 @@ std::vector<HitSounds::Contact> HitSounds::gather(const StepView& step, std::spa
     return std::pair(hits[i]->is_shared, hits[i]->opened_s) < std::pair(hits[j]->is_shared, hits[j]->opened_s);
   });
   std::vector<Contact> together;
-  for (const std::size_t i : chosen) together.push_back(make_contact(step, *hits[i]));
+  for (const std::size_t i : chosen) together.push_back(i == first ? alone.front() : make_contact(step, *hits[i]));
   if (std::none_of(together.begin(), together.end(), [](const Contact& c) { return c.needs_modes(); })) return alone;
   for (const std::size_t i : chosen) taken_[i] = 1;
   return together;
@@ -184,7 +184,8 @@ HitSounds::Setup HitSounds::set_up(const StepView& step, const std::vector<Conta
       if (!c.shapes[side].empty()) setup.shapes[i][side] = turn_shape(hit.before[side].rotation, c.shapes[side]);
     contact.shape_a = setup.shapes[i][0];
     contact.shape_b = setup.shapes[i][1];
-    setup.faces.push_back({.is_sharp = is_sharp(step, hit),
+    setup.faces.push_back({.alone = contact.spring,
+                           .is_sharp = is_sharp(step, hit),
                            .where_m = contact.where_m,
                            .normal = hit.normal,
                            .size_m = step.scene.calc_size(hit.a, hit.b),

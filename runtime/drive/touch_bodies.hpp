@@ -54,12 +54,15 @@ struct StepView {
     if (body < 0) return station;
     return motions[body].centre_m + motions[body].rotation * (station - scene.bodies[body].centre_m);
   }
+  /// Velocity of a station of a body with the velocities of `motion`, in the pose of `pose` [m/s].
+  Vec3 calc_velocity(int body, const Motion& motion, const Motion& pose, const Vec3& station) const {
+    return motion.velocity_m_s + cross(motion.spin_rad_s, pose.rotation * (station - scene.bodies[body].centre_m));
+  }
   /// Velocity of a relative to b at their stations [m/s]: velocities of `motions`, positions of `poses`.
   Vec3 calc_relative(const std::vector<Motion>& motions, const std::vector<Motion>& poses, int a, int b,
                      const std::array<Vec3, 2>& stations) const {
     const auto calc = [&](int body, const Vec3& station) {
-      if (body < 0) return Vec3{};
-      return motions[body].velocity_m_s + cross(motions[body].spin_rad_s, place(poses, body, station) - poses[body].centre_m);
+      return body < 0 ? Vec3{} : calc_velocity(body, motions[body], poses[body], station);
     };
     return calc(a, stations[0]) - calc(b, stations[1]);
   }

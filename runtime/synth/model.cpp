@@ -288,7 +288,7 @@ void Model::copy_shapes(const bank::Bank& bank) {
   std::vector<float>& largest = surface->largest;
   largest.assign(sound_.size() * kGroup, 0.0F);
   for (std::size_t vertex = 0; vertex < bank.vertex_count(); ++vertex) {
-    const std::int16_t* from = bank.shape.data() + vertex * bank.mode_count() * 3;
+    const std::int16_t* from = bank.get_steps(vertex);
     std::int16_t *x = row.data(), *y = x + columns, *z = y + columns;
     for (std::size_t i = 0; i < modes_.size(); ++i) {
       x[column[i]] = from[first[i]];

@@ -153,7 +153,7 @@ std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
       std::copy(harmonics.begin(), harmonics.end(), harmonic.begin() + static_cast<std::ptrdiff_t>((t - first) * kFlowColumns));
       Corners motion{.per_share = static_cast<float>(1.0 / (area * per_area))};
       for (std::size_t k = 0; k < 3; ++k) {
-        motion.steps[k] = &bank.shape[static_cast<std::size_t>(corners[k]) * modes * 3];
+        motion.steps[k] = bank.get_steps(static_cast<std::size_t>(corners[k]));
         motion.share[k] = static_cast<float>(normal[k] / 3.0 * per_area);
       }
       loops.calc_through(motion, modes, &through[(t - first) * rows], block_squares.data());

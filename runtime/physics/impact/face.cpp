@@ -3,13 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 namespace carillon::impact {
 namespace {
 
-constexpr double kFaceCosine = 0.99;     // minimum cosine between normals of one face,
-constexpr double kFlatnessRatio = 0.02;  // fraction of the size: maximum distance of corners from its plane
+constexpr double kFaceCosine = 0.99;  // minimum cosine between normals of one face
 
 /// Area of the convex polygon of given points [m^2].
 double calc_area(std::vector<Vec3> corners, const Vec3& normal) {
@@ -26,12 +24,14 @@ double calc_area(std::vector<Vec3> corners, const Vec3& normal) {
 
 }  // namespace
 
-void share_faces(const Impact& impact, std::span<const FaceCorner> corners, double flat_m, double ahead_s, std::span<Spring> springs) {
+std::vector<Spring> find_springs(const Impact& impact, std::span<const FaceCorner> corners, double flat_m, double ahead_s) {
   const auto is_between = [&](int contact, int first) {
     const Contact &x = impact.get_contact(contact), &y = impact.get_contact(first);
     return (x.a == y.a && x.b == y.b) || (x.a == y.b && x.b == y.a);
   };
   const int count = static_cast<int>(corners.size());
+  std::vector<Spring> springs;
+  for (int k = 0; k < count; ++k) springs.push_back(impact.get_compression(k) > 0.0 ? impact.get_contact(k).spring : corners[k].alone);
   std::vector<char> is_taken(count, 0);
   for (int first = 0; first < count; ++first) {
     const FaceCorner& one = corners[first];
@@ -55,6 +55,7 @@ void share_faces(const Impact& impact, std::span<const FaceCorner> corners, doub
       if (stiffness > 0.0) springs[k] = {.stiffness = stiffness / static_cast<double>(face.size()), .exponent = 1.0};
     }
   }
+  return springs;
 }
 
 }  // namespace carillon::impact

@@ -183,20 +183,17 @@ ModalContact* ModalImpacts::find_nearest(ModalImpact& modal, const Contact& touc
 
 /// Springs of an impact for a part of this length.
 std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal, double part_s) const {
-  std::vector<impact::Spring> springs;
   std::vector<impact::FaceCorner> corners;
-  for (int k = 0; const ModalContact& contact : modal.contacts) {
+  for (const ModalContact& contact : modal.contacts) {
     const int a = contact.forces.a, b = contact.forces.b;
-    springs.push_back(modal.impact->get_compression(k) > 0.0 ? modal.impact->get_contact(k).spring : contact.spring);
-    corners.push_back({.is_sharp = contact.is_sharp && contact.is_followed,
+    corners.push_back({.alone = contact.spring,
+                       .is_sharp = contact.is_sharp && contact.is_followed,
                        .where_m = find_station(contact),
                        .normal = contact.normal,
                        .size_m = bodies_.calc_size(a, b),
                        .compliance_per_pa = bodies_.calc_compliance(a, b)});
-    ++k;
   }
-  impact::share_faces(*modal.impact, corners, kMaxDepthM, part_s, springs);
-  return springs;
+  return impact::find_springs(*modal.impact, corners, kMaxDepthM, part_s);
 }
 
 void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double way_m, double length_s, TouchSets& touches) {

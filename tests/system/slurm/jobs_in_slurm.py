@@ -79,18 +79,18 @@ class Store:
     def status(self, job):
         return next(row for row in self.run("status")["jobs"] if row["id"] == job["id"])
 
-    def wait(self, job, state, seconds=PATIENCE_S):
-        deadline = time.monotonic() + seconds
+    def wait(self, job, state):
+        deadline = time.monotonic() + PATIENCE_S
         while (row := self.status(job))["state"] != state:
-            check(time.monotonic() < deadline, lambda: f"not {state} after {seconds} s: {row}\n{self.log(job)}")
+            check(time.monotonic() < deadline, lambda: f"not {state} after {PATIENCE_S} s: {row}\n{self.log(job)}")
             check(row["state"] not in ("done", "failed", "cancelled"), lambda: f"ended as {row} instead of {state}\n{self.log(job)}")
             time.sleep(0.5)
         return row
 
-    def wait_until(self, holds, seconds=PATIENCE_S):
-        deadline = time.monotonic() + seconds
+    def wait_until(self, holds):
+        deadline = time.monotonic() + PATIENCE_S
         while not holds(counts := self.run("status")["counts"]):
-            check(time.monotonic() < deadline, lambda: f"not in {seconds} s: {counts}")
+            check(time.monotonic() < deadline, lambda: f"not in {PATIENCE_S} s: {counts}")
             time.sleep(0.5)
         return counts
 

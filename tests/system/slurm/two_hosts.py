@@ -13,6 +13,7 @@ import tempfile
 import time
 
 BIN = pathlib.Path(sys.argv[1]).resolve()
+PATIENCE_S = 300  # below CTest's limit, so that a wait without an end prints the log; no correct run comes near it
 NAME = f"car{os.getpid() % 100000}"
 HOSTS = {"n1": "10.77.0.1", "n2": "10.77.0.2"}
 # As ssh would: the command runs on the host, with its name and its network. HOSTS_FILE and NAME are filled in.
@@ -104,7 +105,7 @@ class Site:
         return [self.agent, "n1", f"cd '{self.folder}' && exec {quoted}"]
 
     def run(self, *words):
-        done = subprocess.run(self.command(*words), capture_output=True, text=True, timeout=300)
+        done = subprocess.run(self.command(*words), capture_output=True, text=True, timeout=PATIENCE_S)
         check(done.returncode == 0, f"carillon {words}: {done.stdout}{done.stderr}")
         return json.loads(done.stdout)
 
@@ -129,11 +130,10 @@ class Site:
                 continue
         return found
 
-    def wait(self, runner, what, holds, seconds=300):
-        """seconds: below CTest's limit, so that a wait without an end prints the log; no correct run comes near it."""
-        deadline = time.monotonic() + seconds
+    def wait(self, runner, what, holds):
+        deadline = time.monotonic() + PATIENCE_S
         while not holds():
-            check(time.monotonic() < deadline, f"{what}: not after {seconds} s; {self.status()}\n{self.log()}")
+            check(time.monotonic() < deadline, f"{what}: not after {PATIENCE_S} s; {self.status()}\n{self.log()}")
             check(runner.poll() is None or what == "done", f"{what}: the run has ended; {self.status()}\n{self.log()}")
             time.sleep(0.3)
 
@@ -163,7 +163,7 @@ def main():
             check(row["attempts"] == 2, f"not by the second attempt: {row}")
             done = subprocess.run([BIN / "carillon-bank", "check", row["bank"]], capture_output=True, text=True)
             check(done.returncode == 0, f"the bank is not whole: {done.stdout}{done.stderr}")
-            check(runner.wait(300) == 0, "the run did not end well")
+            check(runner.wait(PATIENCE_S) == 0, "the run did not end well")
         finally:
             runner.terminate()
             runner.wait()

@@ -29,7 +29,8 @@ struct Landing {
       Contact& corner = contacts.emplace_back(make_contact(kCornerM));
       corner.where_m = {(k == 0 || k == 3 ? 1.0 : -1.0) * kHalf[0], (k < 2 ? 1.0 : -1.0) * kHalf[1], 0.0};
       corner.gap_m = gaps_m[k];
-      corners.push_back({.is_sharp = true,
+      corners.push_back({.alone = corner.spring,
+                         .is_sharp = true,
                          .where_m = corner.where_m,
                          .normal = corner.normal,
                          .size_m = 0.1,
@@ -38,16 +39,9 @@ struct Landing {
   }
 };
 
-std::vector<Spring> find_springs(const Impact& impact, const Landing& landing, double ahead_s) {
-  std::vector<Spring> springs;
-  for (const Contact& contact : landing.contacts) springs.push_back(contact.spring);
-  share_faces(impact, landing.corners, kFlatM, ahead_s, springs);
-  return springs;
-}
-
 TEST(Face, LandsAsAFlatPunch) {
   Landing landing({});
-  const std::vector<Spring> springs = find_springs(Impact({landing.box}, landing.contacts), landing, 1e-4);
+  const std::vector<Spring> springs = find_springs(Impact({landing.box}, landing.contacts), landing.corners, kFlatM, 1e-4);
   const double area = 4.0 * kHalf[0] * kHalf[1], stiffness = kYoung / (1.0 - kPoisson * kPoisson) * std::sqrt(area / kPi);
   for (std::size_t k = 0; k < 4; ++k) landing.contacts[k].spring = springs[k];
   Impact impact({landing.box}, landing.contacts, {.steps_per_pulse = 200.0});
@@ -66,13 +60,13 @@ TEST(Face, NeedsThreeCornersThatArePressed) {
   };
   const Landing tilted({0.0, 0.0, 5e-5, 5e-5});
   const Impact impact({tilted.box}, tilted.contacts);
-  EXPECT_EQ(count_linear(find_springs(impact, tilted, 6e-5)), 0) << "two corners are still open";
-  EXPECT_EQ(count_linear(find_springs(impact, tilted, 8e-5)), 4);
+  EXPECT_EQ(count_linear(find_springs(impact, tilted.corners, kFlatM, 6e-5)), 0) << "two corners are still open";
+  EXPECT_EQ(count_linear(find_springs(impact, tilted.corners, kFlatM, 8e-5)), 4);
   Landing others({});
   others.corners[0].normal = {0.6, 0.0, 0.8};
-  EXPECT_EQ(count_linear(find_springs(impact, others, 1e-4)), 3) << "of another face";
+  EXPECT_EQ(count_linear(find_springs(impact, others.corners, kFlatM, 1e-4)), 3) << "of another face";
   others.corners[1].is_sharp = false;
-  EXPECT_EQ(count_linear(find_springs(impact, others, 1e-4)), 0) << "of a curved surface";
+  EXPECT_EQ(count_linear(find_springs(impact, others.corners, kFlatM, 1e-4)), 0) << "of a curved surface";
 }
 
 /// A face that forms while corners are pressed changes no energy.
@@ -81,7 +75,7 @@ TEST(Face, KeepsTheEnergyWhileItForms) {
   Impact impact({landing.box}, landing.contacts);
   int changes = 0;
   while (!impact.advance(impact.get_time() + 1e-5) && impact.get_time() < 0.05) {
-    const std::vector<Spring> springs = find_springs(impact, landing, 1e-5);
+    const std::vector<Spring> springs = find_springs(impact, landing.corners, kFlatM, 1e-5);
     for (int k = 0; k < 4; ++k) {
       if (springs[k] == impact.get_contact(k).spring) continue;
       impact.exchange_spring(k, springs[k]);
