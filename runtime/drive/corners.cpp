@@ -5,7 +5,7 @@
 #include <span>
 
 #include "runtime/base/quaternion.hpp"
-#include "runtime/physics/geometry/vectors.hpp"
+#include "runtime/physics/geometry/shape.hpp"
 #include "runtime/physics/impact/face.hpp"
 #include "runtime/physics/rigid/limits.hpp"
 
