@@ -21,7 +21,6 @@ constexpr double kStrikeGapM = 1e-6;     // m; a touch nearer than this at the e
 constexpr double kMaxStopM = 5e-5;       // m; depth of a touch that a row stops,
 constexpr double kMinPartS = 4e-6;       // s; unless the step becomes shorter
 constexpr double kCrowdedS = 2e-3;       // s; duration of the crowded state of an island
-constexpr double kRattleS = 60e-3;  // s; a pair with more slow impacts than Pair::slow_hits within this time has none for the same time
 
 /// True if this touch closes within the step, faster than `slowest`.
 bool is_faster(const Bodies& bodies, const Contact& c, double h, double slowest) {

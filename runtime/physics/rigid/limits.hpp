@@ -5,6 +5,7 @@ namespace carillon::rigid {
 
 inline constexpr double kMinImpactSpeedMS = 1e-3;   // m/s; slower touches are no impacts (a fall from 0.05 um)
 inline constexpr double kRattleSpeedMS = 8e-2;      // m/s; slower touches of a rattling pair are no impacts
+inline constexpr double kRattleS = 60e-3;           // s; a pair with more impacts than Pair::slow_hits in this time has none for as long
 inline constexpr double kSimultaneousS = 1e-4;      // s; touches nearer in time are one impact
 inline constexpr double kLongestPulseS = 0.2;       // s; of a blow on a body that bends far
 inline constexpr double kTouchGapM = 1e-7;          // m; smaller gaps count as contact

@@ -18,6 +18,7 @@ constexpr double kSamePlaceRatio = 0.05;      // of the size
 constexpr double kMinMoveRatio = 0.02;        // fraction of the size: minimum distance of a contact from its touch for an update
 constexpr int kMaxFollowed = 12;              // contacts per impact, including open ones
 constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
+constexpr int kMaxRolled = 8;                 // slow pulses in a row, each at another place: the impact has become rolling
 constexpr double kRoundingRatio = 1e-12;      // of velocities
 constexpr double kQuietAfterImpactS = 5e-3;   // s; after the end of an impact, without slow impacts of the pair
 
@@ -141,8 +142,8 @@ void ModalImpacts::end_where_touching(const Step& step, TouchSets& touches) {
     }
 }
 
-/// Moves a contact to its touch.
-void ModalImpacts::place(ModalContact& contact, bool is_closed, Contact& touch, const geometry::Touch& at) {
+/// Moves a contact to its touch; true if a pulse ends because the touch is at another place.
+bool ModalImpacts::place(ModalContact& contact, bool is_closed, Contact& touch, const geometry::Touch& at) {
   Forces& forces = contact.forces;
   const bool is_swapped = forces.a != touch.a;
   contact.touch = touch.touch.id;
@@ -152,7 +153,8 @@ void ModalImpacts::place(ModalContact& contact, bool is_closed, Contact& touch, 
   contact.gap_m = at.gap_m;
   touch.press();
   const Vec3 station = find_station(touch.a, touch.b, at);
-  if (norm(contact.station - station) < kMinMoveRatio * bodies_.calc_size(touch.a, touch.b)) return;
+  if (norm(contact.station - station) < kMinMoveRatio * bodies_.calc_size(touch.a, touch.b)) return false;
+  const bool has_pulse = forces.continues || !forces.on_a.empty();
   report(contact);
   forces.continues = false;
   forces.moves = is_closed;
@@ -164,6 +166,7 @@ void ModalImpacts::place(ModalContact& contact, bool is_closed, Contact& touch, 
     (is_first ? forces.place_a : forces.place_b) = find_place(bodies_, hit, is_a);
     if (bodies_.has_modes(is_a ? touch.a : touch.b)) (is_first ? contact.shape_a : contact.shape_b) = find_shape(bodies_, hit, is_a);
   }
+  return has_pulse;
 }
 
 /// Contact for a touch with a new id: the nearest at its position, or an open one for a touch that may close.
@@ -198,8 +201,10 @@ std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal,
 
 void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double way_m, double length_s, TouchSets& touches) {
   const double reach_m = 2.0 * way_m + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kMaxDepthM;
-  const auto is_closed = [&](const ModalContact& contact) {
-    return modal.impact->get_compression(static_cast<int>(&contact - modal.contacts.data())) > 0.0;
+  const auto follow_touch = [&](ModalContact& contact, Contact& c) {
+    const int k = static_cast<int>(&contact - modal.contacts.data());
+    if (!place(contact, modal.impact->get_compression(k) > 0.0, c, touches.find_closing(pair, c, length_s))) return;
+    modal.rolled = std::abs(modal.impact->calc_approach(k)) < kRattleSpeedMS ? modal.rolled + 1 : 0;
   };
   std::vector<Contact*> others;
   for (Contact& c : pair.contacts) {
@@ -207,14 +212,14 @@ void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double way_m, double l
       return !contact.is_followed && contact.is_between(pair.a, pair.b) && contact.touch == c.touch.id;
     });
     if (same != modal.contacts.end())
-      place(*same, is_closed(*same), c, touches.find_closing(pair, c, length_s));
+      follow_touch(*same, c);
     else
       others.push_back(&c);
   }
   for (Contact* c : others) {
     const bool is_near = c->touch.gap_m < reach_m;
     if (ModalContact* nearest = find_nearest(modal, *c, is_near); nearest != nullptr) {
-      place(*nearest, is_closed(*nearest), *c, touches.find_closing(pair, *c, length_s));
+      follow_touch(*nearest, *c);
     } else if (is_near && modal.contacts.size() < kMaxFollowed) {
       Hit hit{.a = c->a, .b = c->b, .touch = touches.find_closing(pair, *c, length_s), .triangles = c->triangles};
       Made made;
@@ -345,10 +350,18 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
     // Once per window, to avoid many short pieces
     if (to_s >= window_end_s - 1e-9)
       for (ModalContact& contact : modal.contacts) report(contact);
-    bool is_slow = true;  // also where a body rolls or slides fast
-    for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k)
+    bool is_slow = true, is_deep = false;  // is_slow: also where a body rolls or slides fast
+    for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) {
       is_slow = is_slow && (!(modal.impact->get_compression(k) > 0.0) || std::abs(modal.impact->calc_approach(k)) < kRattleSpeedMS);
-    if (!ended && to_s - modal.start_s <= (is_slow ? kMaxSlowImpactS : kMaxImpactS)) continue;
+      is_deep = is_deep || modal.impact->calc_depth(k) > kMaxDepthM;
+    }
+    const bool rolls = is_slow && !is_deep && modal.rolled > kMaxRolled;  // a deep one would have to be lifted
+    if (!ended && !rolls && to_s - modal.start_s <= (is_slow ? kMaxSlowImpactS : kMaxImpactS)) continue;
+    if (rolls)
+      for (Pair* pair : step.island().pairs)
+        if (std::any_of(modal.contacts.begin(), modal.contacts.end(),
+                        [&](const ModalContact& c) { return c.is_between(pair->a, pair->b); }))
+          pair->rattles_until_s = std::max(pair->rattles_until_s, to_s + kRattleS);
     // The impact, and the other forces with it, extend beyond the end of the part.
     const double beyond_s = modal.start_s + modal.impact->get_time() - to_s;
     const std::vector<int> moved = modal.bodies;

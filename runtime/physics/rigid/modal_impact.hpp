@@ -36,6 +36,7 @@ struct ModalImpact {
   double start_s = 0.0;
   std::vector<int> bodies;  // in the order of `impact`
   std::vector<ModalContact> contacts;
+  int rolled = 0;  // slow pulses in a row that ended because their contact moved to another place
 };
 
 /// Impacts integrated with the modes of their bodies (runtime/physics/impact) over as many small steps as needed. They determine the motion
@@ -104,7 +105,7 @@ class ModalImpacts {
   void follow(ModalImpact& modal, Pair& pair, double way_m, double length_s, TouchSets& touches);
   void part(Pair& pair, const TouchSets& touches) const;
   ModalContact* find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const;
-  void place(ModalContact& contact, bool is_closed, Contact& touch, const geometry::Touch& at);
+  bool place(ModalContact& contact, bool is_closed, Contact& touch, const geometry::Touch& at);
   std::vector<impact::Spring> find_springs(const ModalImpact& modal, double part_s) const;
   static double calc_yield(const impact::Contact& contact, const std::vector<impact::Body>& bodies);
   bool add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const;
