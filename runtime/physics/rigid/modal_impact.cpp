@@ -30,6 +30,10 @@ void push(impact::Impact& impact, int n, const impact::Body& b, const Vec3& velo
     impact.push(n, change, spin_change);
 }
 
+bool has_contact(const ModalImpact& modal, const Pair& pair) {
+  return std::any_of(modal.contacts.begin(), modal.contacts.end(), [&](const ModalContact& c) { return c.is_between(pair.a, pair.b); });
+}
+
 }  // namespace
 
 ModalImpact* ModalImpacts::find(int body) {
@@ -284,6 +288,17 @@ bool ModalImpacts::may_meet_others(const Step& step, double length_s, TouchSets&
   return false;
 }
 
+/// Reason to end an impact before its contacts have separated.
+ModalImpacts::End ModalImpacts::find_end(const ModalImpact& modal, double time_s) {
+  bool is_slow = true, is_deep = false;  // is_slow: also where a body rolls or slides fast
+  for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) {
+    is_slow = is_slow && (!(modal.impact->get_compression(k) > 0.0) || std::abs(modal.impact->calc_approach(k)) < kRattleSpeedMS);
+    is_deep = is_deep || modal.impact->calc_depth(k) > kMaxDepthM;
+  }
+  if (is_slow && !is_deep && modal.rolled > kMaxRolled) return End::rolls;  // a deep one would have to be lifted
+  return time_s - modal.start_s > (is_slow ? kMaxSlowImpactS : kMaxImpactS) ? End::lasts : End::none;
+}
+
 void ModalImpacts::advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches) {
   for (ModalImpact& modal : impacts_) {
     const bool is_here = std::any_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; });
@@ -350,18 +365,11 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
     // Once per window, to avoid many short pieces
     if (to_s >= window_end_s - 1e-9)
       for (ModalContact& contact : modal.contacts) report(contact);
-    bool is_slow = true, is_deep = false;  // is_slow: also where a body rolls or slides fast
-    for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) {
-      is_slow = is_slow && (!(modal.impact->get_compression(k) > 0.0) || std::abs(modal.impact->calc_approach(k)) < kRattleSpeedMS);
-      is_deep = is_deep || modal.impact->calc_depth(k) > kMaxDepthM;
-    }
-    const bool rolls = is_slow && !is_deep && modal.rolled > kMaxRolled;  // a deep one would have to be lifted
-    if (!ended && !rolls && to_s - modal.start_s <= (is_slow ? kMaxSlowImpactS : kMaxImpactS)) continue;
-    if (rolls)
+    const End end = find_end(modal, to_s);
+    if (!ended && end == End::none) continue;
+    if (end == End::rolls)
       for (Pair* pair : step.island().pairs)
-        if (std::any_of(modal.contacts.begin(), modal.contacts.end(),
-                        [&](const ModalContact& c) { return c.is_between(pair->a, pair->b); }))
-          pair->rattles_until_s = std::max(pair->rattles_until_s, to_s + kRattleS);
+        if (has_contact(modal, *pair)) pair->rattles_until_s = std::max(pair->rattles_until_s, to_s + kRattleS);
     // The impact, and the other forces with it, extend beyond the end of the part.
     const double beyond_s = modal.start_s + modal.impact->get_time() - to_s;
     const std::vector<int> moved = modal.bodies;

@@ -102,6 +102,8 @@ class ModalImpacts {
   ModalImpact* find(int body);
   ModalImpact* find_own(const Step& step, const Hit& hit);
   std::optional<Selection> select(const Step& step, const Collision& collision, const Instants& instants);
+  enum class End { none, rolls, lasts };
+  static End find_end(const ModalImpact& modal, double time_s);
   void follow(ModalImpact& modal, Pair& pair, double way_m, double length_s, TouchSets& touches);
   void part(Pair& pair, const TouchSets& touches) const;
   ModalContact* find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const;
