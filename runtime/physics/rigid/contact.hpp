@@ -79,6 +79,8 @@ struct Pair {
   double sag_m = 0.0;                  // depth left by an ended modal impact: permitted, decays
   Vec3 apart_m{};                      // displacement of a in touch searches if the penetration is large for the thickness
 
+  void quiet_until(double time_s) { rattles_until_s = std::max(rattles_until_s, time_s); }
+
   /// Resets the travel, as after a search: no other point of the pair can touch.
   void renew_search() { travelled_m = std::min(travelled_m, kMovedM); }
   double take_stopped_j() { return std::exchange(stopped_j, 0.0); }

@@ -57,8 +57,7 @@ bool Instants::find(const Step& step, double& at_s, std::vector<ContactRef>& fir
     for (int k = 0; const Contact& c : pair->contacts) {
       const ContactRef ref{pair, k++};
       if (!is_fast(bodies_, *pair, c, h)) {
-        if (rattles(bodies_, *pair) && is_faster(bodies_, c, h, kMinImpactSpeedMS))
-          pair->rattles_until_s = bodies_.get_time() + h + kRattleS;
+        if (rattles(bodies_, *pair) && is_faster(bodies_, c, h, kMinImpactSpeedMS)) pair->quiet_until(bodies_.get_time() + h + kRattleS);
         if (c.closes_s >= 0.0 && !c.presses) candidates.push_back({ref, c.closes_s, 0.0});
         continue;
       }
@@ -178,7 +177,7 @@ void Instants::note(const std::vector<ContactRef>& contacts, const std::vector<H
     // A ball bouncing to rest also strikes often, but each time slower by its restitution e: by e^4 over these.
     const Pair::SlowHit& first = pair->slow_hits.front();
     const bool decays = speed < std::pow(bodies_.calc_restitution(pair->a, pair->b), 2.0) * first.speed_m_s;
-    if (first.time_s >= 0.0 && time_s - first.time_s < kRattleS && !decays) pair->rattles_until_s = time_s + kRattleS;
+    if (first.time_s >= 0.0 && time_s - first.time_s < kRattleS && !decays) pair->quiet_until(time_s + kRattleS);
     std::shift_left(pair->slow_hits.begin(), pair->slow_hits.end(), 1);
     pair->slow_hits.back() = {time_s, speed};
   }

@@ -141,7 +141,7 @@ void ModalImpacts::end_where_touching(const Step& step, TouchSets& touches) {
         is_deep = is_deep || (depth > 0.0 && depth > kExplainedRatio * calc_depth(*pair, c.touch.where_m));
         is_resting = is_resting || (c.carries() && std::abs(bodies_.calc_approach(c.touch, c.a, c.b)) <= kMinImpactSpeedMS);
       }
-      if (is_deep) pair->rattles_until_s = std::max(pair->rattles_until_s, bodies_.get_time() + kQuietAfterImpactS);
+      if (is_deep) pair->quiet_until(bodies_.get_time() + kQuietAfterImpactS);
       if (is_deep || is_resting) end(*modal, touches);
     }
 }
@@ -369,7 +369,7 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
     if (!ended && end == End::none) continue;
     if (end == End::rolls)
       for (Pair* pair : step.island().pairs)
-        if (has_contact(modal, *pair)) pair->rattles_until_s = std::max(pair->rattles_until_s, to_s + kRattleS);
+        if (has_contact(modal, *pair)) pair->quiet_until(to_s + kRattleS);
     // The impact, and the other forces with it, extend beyond the end of the part.
     const double beyond_s = modal.start_s + modal.impact->get_time() - to_s;
     const std::vector<int> moved = modal.bodies;

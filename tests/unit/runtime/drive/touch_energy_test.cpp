@@ -85,7 +85,6 @@ std::vector<events::Force> land(const std::vector<std::pair<int, int>>& corners,
   rig.step(1e-4, points);
   for (int n = 0; n < 300; ++n) rig.step(1e-4, {});
   EXPECT_LE(rig.sum_impulses(0)[2], 1.001 * impulse);
-  // At most what the motion lost.
   const double lost_j = 0.5 * plate.rigid.mass_kg * kLandingMS * kLandingMS * (1.0 - kLandingRestitution * kLandingRestitution);
   EXPECT_LE(calc_modal_j(rig, plate, 0), 1.001 * lost_j);
   auto forces = rig.list<events::Force>();
