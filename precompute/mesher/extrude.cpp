@@ -68,6 +68,7 @@ std::vector<Vec3> find_ways_out(const Skin& skin, const std::vector<std::array<V
                       2 * std::asin(1 / kMaxMitre) * 180 / std::numbers::pi));
     out.push_back(way);
   }
+  for (const MitrePoint& point : skin.mitre_points) point.interpolate(out);
   return out;
 }
 
@@ -134,8 +135,9 @@ class Extruder {
           lean[t[c]] += dot(ways_[t[c]], edge) / norm(edge);
         }
     constexpr double kLeans = 0.5;
-    std::vector<int> classes;
+    std::vector<double> classes;
     for (const double l : lean) classes.push_back(l < -kLeans ? 0 : l > kLeans ? 2 : 1);
+    for (const MitrePoint& point : skin_.mitre_points) point.interpolate(classes);
     const auto order = base::find_sort_order(classes);
     rank_.resize(count());
     for (std::size_t n = 0; n < order.size(); ++n) rank_[order[n]] = static_cast<std::int32_t>(n);

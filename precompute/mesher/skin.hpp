@@ -11,10 +11,21 @@
 
 namespace carillon::mesher {
 
+/// Point in a mitre: on an edge from `fold` to `end`, by which the wall's other side is interpolated.
+struct MitrePoint {
+  std::int32_t point = 0, fold = 0, end = 0;
+  double part = 0;  // of the edge, from the fold
+  template <class T>
+  void interpolate(std::vector<T>& values) const {
+    values[point] = (1 - part) * values[fold] + part * values[end];
+  }
+};
+
 /// Triangle surface, open or closed, at most two triangles per edge. Folds: sharp edges other than the border.
 struct Skin {
   TriangleSurface surface;
   std::vector<Edge> folds;
+  std::vector<MitrePoint> mitre_points = {};  // ends before the points between them and the fold
 };
 
 /// Target edge length.
@@ -50,6 +61,9 @@ struct LeavingEdge {
 inline constexpr double kMinSine = 0.3;
 using RingDistance = std::function<double(const LeavingEdge& edge)>;
 Skin add_rings(const Skin& skin, const SkinPlaces& places, const RingDistance& distance_m);
+
+/// Splits the edges that leave these points on folds to lengths near `edge_m`, so that elements in mitres are as fine as elsewhere.
+Skin divide_mitres(const Skin& skin, const SkinPlaces& places, double edge_m, const std::vector<char>& is_mitred);
 
 /// Moves points and flips edges in corners between the mitres of several folds, so that no copy of a triangle, with points `levels_m` along
 /// `ways`, is folded or much smaller than the other. Points on folds stay on them.

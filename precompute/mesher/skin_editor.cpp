@@ -22,6 +22,7 @@ SkinEditor::SkinEditor(const Skin& skin, const SkinPlaces& places, double size_m
       star_(x_.size()),
       features_(find_features(skin)),
       size_(x_.size(), size_m),
+      mitre_points_(skin.mitre_points),
       places_(places) {
   for (std::size_t f = 0; f < t_.size(); ++f)
     for (const std::int32_t v : t_[f]) star_[v].push_back(static_cast<std::int32_t>(f));
@@ -46,6 +47,7 @@ Skin SkinEditor::get(std::vector<std::int32_t>& number) const {
   for (const Edge& e : features_)
     if (!border_.contains(e)) out.folds.push_back(make_edge(number[e[0]], number[e[1]]));
   std::sort(out.folds.begin(), out.folds.end());
+  for (const MitrePoint& m : mitre_points_) out.mitre_points.push_back({number[m.point], number[m.fold], number[m.end], m.part});
   return out;
 }
 

@@ -63,6 +63,7 @@ class SkinEditor {
   void move(std::int32_t v, const Vec3& p) { x_[v] = p; }
 
   void split(std::int32_t a, std::int32_t b, const Vec3& at);
+  void add_mitre_point(const MitrePoint& point) { mitre_points_.push_back(point); }
   /// Merges two points unless that changes folds, flips a triangle or makes edges longer than `longest` times their target.
   bool collapse(std::int32_t a, std::int32_t b, double longest);
   /// Flips edge a b to c d, unless the surface would change.
@@ -84,6 +85,7 @@ class SkinEditor {
   EdgeSet features_, border_;                    // border_ is a subset of features_
   std::vector<Kind> kind_;
   std::vector<double> size_;
+  std::vector<MitrePoint> mitre_points_;
   const SkinPlaces& places_;
 };
 

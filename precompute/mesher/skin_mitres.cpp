@@ -60,6 +60,37 @@ Skin add_rings(const Skin& start, const SkinPlaces& places, const RingDistance& 
   return skin.get();
 }
 
+Skin divide_mitres(const Skin& start, const SkinPlaces& places, double edge_m, const std::vector<char>& is_mitred) {
+  SkinEditor skin(start, places, 0);
+  const auto& x = skin.get_points();
+  const auto along = skin.find_along();
+  // Of a point from the nearest fold at `fold`.
+  const auto calc_distance = [&](std::int32_t fold, std::int32_t point) {
+    const Vec3 way = x[point] - x[fold];
+    double least = norm(way);
+    for (const std::int32_t other : along.at(fold)) {
+      const Vec3 side = calc_unit(x[other] - x[fold]);
+      least = std::min(least, norm(way - dot(way, side) * side));
+    }
+    return least;
+  };
+  constexpr int kMaxDivisions = 6;  // finer elements there would be needles
+  for (int division = 0; division < kMaxDivisions; ++division) {
+    for (const auto& [a, b] : skin.list_edges()) {
+      const bool is_a = skin.get_kind(a) != SkinEditor::kInside;
+      if (is_a == (skin.get_kind(b) != SkinEditor::kInside)) continue;
+      const std::int32_t fold = is_a ? a : b, end = is_a ? b : a;
+      if (is_mitred[fold] == 0) continue;
+      const double parts = std::min(std::round(calc_distance(fold, end) / edge_m), kMaxDivisions + 1.0);
+      if (parts < 2) continue;
+      const double part = 1 - 1 / parts;
+      skin.add_mitre_point({static_cast<std::int32_t>(x.size()), fold, end, part});
+      skin.split(fold, end, places.on_surface(x[fold] + part * (x[end] - x[fold])));
+    }
+  }
+  return skin.get();
+}
+
 Skin make_room(const Skin& start, const SkinPlaces& places, const std::vector<Vec3>& ways, const std::array<double, 2>& levels_m) {
   SkinEditor skin(start, places, 0);
   const auto& x = skin.get_points();

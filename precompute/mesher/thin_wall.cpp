@@ -202,9 +202,9 @@ struct ThinSizes {
   double nodes = 0;  // approximate
 };
 
-/// Edges shorter than the wall thickness get several layers, for isotropic elements.
+/// Short edges get several layers: one layer bends too stiffly at folds, however fine it is in the plane.
 ThinSizes choose_sizes(double area_m2, double wall_m, const SurfaceOptions& options) {
-  constexpr double kPerLayer = 0.65;  // shortest edge over layer thickness
+  constexpr double kPerLayer = 1.0;  // shortest edge over layer thickness
   constexpr int kMaxLayers = 6;
   ThinSizes sizes;
   for (;; ++sizes.layers) {
@@ -338,8 +338,14 @@ class ThinMesher {
       return distance;
     });
     attempt.rings = static_cast<std::int64_t>(attempt.skin.surface.points.size() - points);
-    attempt.nodes = count_mesh_nodes(attempt.skin.surface, order_, layers_);
+    attempt.nodes = count_mesh_nodes(divide(attempt.skin, edge_m).surface, order_, layers_);
     return attempt;
+  }
+
+  Skin divide(const Skin& skin, double edge_m) const {
+    std::vector<char> is_mitred;
+    for (const Vec3& way : find_ways_out(skin)) is_mitred.push_back(norm(way) > kRingFrom ? 1 : 0);
+    return divide_mitres(skin, places_, edge_m, is_mitred);
   }
 
   Attempt meet_count() {
@@ -378,7 +384,10 @@ class ThinMesher {
     const double edge = edge_;
     for (std::size_t n = 0;; ++n) {
       try {
-        return extrude_skin(attempt.skin);
+        Skin divided = divide(attempt.skin, edge_);
+        Extruded extruded = extrude_skin(divided);
+        attempt.skin = std::move(divided);
+        return extruded;
       } catch (const WallError&) {
         if (!may_retry || n == kFactors.size()) throw;
       }
@@ -419,6 +428,7 @@ class ThinMesher {
         low.push_back(low_source_->find(p - (way / norm(ways[v])) * ways[v]));
       }
     }
+    for (const MitrePoint& point : skin.mitre_points) point.interpolate(low);
     return low;
   }
 

@@ -33,7 +33,9 @@ constexpr double kUnsureGrowth = 6.0;   // maximum, of the nodes until two meshe
 constexpr double kRoughGrowth = 3.0;    // and while an estimate is rough
 constexpr double kLayered = 0.5;        // of the estimate of the widest bar: tractions, of which one layer leaves the most
 constexpr double kLayeredGrowth = 1.1;  // of the nodes with the second layer: the edges in the plane become longer
-constexpr double kApart = 0.5;          // maximum, of the corrections until then, so that the next mesh is far enough for a verdict
+constexpr double kApart = 0.5;          // maximum, of the corrections until then, so that the next mesh is far enough for a verdict,
+constexpr double kApartSingular = 0.6;  // and from one with inward edges
+constexpr double kSingular = 0.25;      // of the estimate of the widest bar: at inward edges
 constexpr double kMinStep = 0.9;        // maximum: nearly equal edges give no new information
 constexpr int kMaxCounts = 6;           // node counts tried per trial
 constexpr int kMaxRefinements = 4;      // of a mesh file: 4,096 elements per element
@@ -86,6 +88,8 @@ class Search {
   double find_dimension() const;
   double find_last_hz() const;
   bool are_reliable() const;
+  const error_bars::ErrorParts* find_widest() const;
+  double find_apart() const;
   bool wants_layer() const;
   double predict_worst(bool keeps_geometry, double ratio) const;
   double find_ratio(double goal_cents, double min) const;
@@ -181,15 +185,31 @@ bool Search::are_reliable() const {
                              [&](std::size_t m) { return bank::is_reliable(corrections.correction[m]); });
 }
 
-/// One layer of T10 bends with a constant shear through the thickness, however fine it is in the plane, and leaves its traction on the
-/// faces.
-bool Search::wants_layer() const {
+/// Of the mode with the widest bar; null if there is no mode.
+const error_bars::ErrorParts* Search::find_widest() const {
   const error_bars::ErrorBars& bars = current_.solved.errors.bars;
-  if (run_.job.body->shape.empty() || report_.trials.back().setting.layers > 1) return false;
   const std::vector<std::size_t> listed = find_bank_modes(run_.job, bars.corrected);
   const auto widest =
       std::ranges::max_element(listed, {}, [&](std::size_t m) { return bars.algebraic_cents[m] + bars.corrected.cents[m]; });
-  return widest != listed.end() && bars.level.parts[*widest].tractions > kLayered * bars.level.parts[*widest].interpolation;
+  return widest == listed.end() ? nullptr : &bars.level.parts[*widest];
+}
+
+/// Largest edge ratio of a mesh whose estimate differs enough for a verdict. Where much of it is at inward edges, the second mesh shows
+/// that all of it falls with their order.
+double Search::find_apart() const {
+  const error_bars::ErrorParts* parts = find_widest();
+  const bool is_singular = parts != nullptr && report_.trials.size() == 1 && parts->singular > kSingular * parts->interpolation;
+  const double ratio =
+      is_singular ? std::pow(kApartSingular, 1.0 / std::min(order_, error_bars::kSingularOrder)) : std::pow(kApart, 1.0 / order_);
+  return std::min(kMinStep, ratio);
+}
+
+/// One layer of T10 bends with a constant shear through the thickness, however fine it is in the plane, and leaves its traction on the
+/// faces.
+bool Search::wants_layer() const {
+  if (run_.job.body->shape.empty() || report_.trials.back().setting.layers > 1) return false;
+  const error_bars::ErrorParts* parts = find_widest();
+  return parts != nullptr && parts->tractions > kLayered * parts->interpolation;
 }
 
 /// Growth exponent of the nodes with 1 / edge length: thin bodies refine in two directions.
@@ -284,7 +304,7 @@ Decision Search::decide_on_body() {
   }
   const bool is_reliable = are_reliable(), is_agreed = is_reliable && last.correction == bank::Correction::kTwoMeshes;
   const double finest = is_agreed ? kFinestStep : std::pow(is_reliable ? kUnsureGrowth : kRoughGrowth, -1.0 / find_dimension());
-  const double longest = is_agreed ? kMinStep : std::min(kMinStep, std::pow(kApart, 1.0 / order_));
+  const double longest = is_agreed ? kMinStep : find_apart();
   const double ratio = find_ratio(kGoal * asked_, finest);
   return {0, make_setting(last.setting.element, std::clamp(ratio, finest, std::max(finest, longest)))};
 }

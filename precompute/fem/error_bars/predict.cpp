@@ -20,11 +20,8 @@ double calc_shift(double shift, double noise) {
 double find_order(Kind kind) { return kind == Kind::kT4 ? 2.0 : 4.0; }
 
 ErrorParts predict_parts(const ErrorParts& parts, Kind kind, double order, double edge_ratio) {
-  // lambda at an edge where stress grows with r^(alpha - 1) is off by h^(2 alpha): around 270 degrees alpha is 0.54 (opening), 2/3
-  // (tearing) and 0.91 (shear), at a fixed face of a free body 0.71.
-  constexpr double kSingular = 4.0 / 3;
   const double second = edge_ratio * edge_ratio, interpolation = std::pow(edge_ratio, order),
-               singular = std::pow(edge_ratio, std::min(order, kSingular));
+               singular = std::pow(edge_ratio, std::min(order, kSingularOrder));
   const double geometry = kind == Kind::kT10Curved ? second * second : second;
   ErrorParts then = parts;
   then.interpolation = (parts.interpolation - parts.singular) * interpolation + parts.singular * singular;
