@@ -264,6 +264,7 @@ std::array<double, 2> find_levels(Side side, double wall_m) {
 
 struct Attempt {
   Skin skin;
+  double edge_m = 0;       // asked for
   std::int64_t rings = 0;  // points added by rings
   std::int64_t nodes = 0;
 };
@@ -299,10 +300,21 @@ class ThinMesher {
 
   mesh::TetMesh make() {
     Attempt attempt;
-    phases_.run("remeshing the skin", [&] { attempt = meet_count(); });
     Extruded extruded;
-    phases_.run("extruding", [&] { extruded = extrude_or_retry(attempt); });
-    phases_.run("comparing with the body", [&] { compare(attempt.skin, extruded.mesh); });
+    const auto run = [&] {
+      phases_.run("remeshing the skin", [&] { attempt = meet_count(); });
+      phases_.run("extruding", [&] { extruded = extrude_or_retry(attempt); });
+      phases_.run("comparing with the body", [&] { compare(attempt.skin, extruded.mesh); });
+    };
+    const double edge = edge_;
+    try {
+      run();
+    } catch (const std::exception&) {
+      if (!has_divided_) throw;
+      divides_ = false;  // a sharp fold has no space for more points
+      edge_ = edge;
+      run();
+    }
     fill_report(attempt, extruded);
     spread_doubt(attempt.skin.surface, extruded);
     return std::move(extruded.mesh);
@@ -319,6 +331,7 @@ class ThinMesher {
     const SkinSizes sizes{edge_m, std::min(edge_m, std::max(kMinPerWall * wall, 0.2 * edge_m)), per_radius,
                           (body_.low ? 1.5 : 1) * std::max(std::abs(levels_[0]), std::abs(levels_[1])), calc_margin(edge_m)};
     Attempt attempt;
+    attempt.edge_m = edge_m;
     Skin plain = remesh(source_.get_start(), sizes, places_);
     const std::size_t points = plain.surface.points.size();
     const std::vector<Vec3> ways = find_ways_out(plain);
@@ -342,10 +355,19 @@ class ThinMesher {
     return attempt;
   }
 
-  Skin divide(const Skin& skin, double edge_m) const {
+  /// Relative difference from the count that was asked for.
+  double calc_miss(const Skin& skin) const {
+    const auto nodes = static_cast<double>(count_mesh_nodes(skin.surface, order_, layers_));
+    return options_.nodes ? nodes / static_cast<double>(*options_.nodes) - 1 : 0.0;
+  }
+
+  Skin divide(const Skin& skin, double edge_m) {
+    if (!divides_) return skin;
     std::vector<char> is_mitred;
     for (const Vec3& way : find_ways_out(skin)) is_mitred.push_back(norm(way) > kRingFrom ? 1 : 0);
-    return divide_mitres(skin, places_, edge_m, is_mitred);
+    Skin divided = divide_mitres(skin, places_, edge_m, is_mitred);
+    has_divided_ = has_divided_ || !divided.mitre_points.empty();
+    return divided;
   }
 
   Attempt meet_count() {
@@ -384,7 +406,9 @@ class ThinMesher {
     const double edge = edge_;
     for (std::size_t n = 0;; ++n) {
       try {
-        Skin divided = divide(attempt.skin, edge_);
+        Skin divided = divide(attempt.skin, attempt.edge_m);
+        if (!divided.mitre_points.empty() && std::abs(calc_miss(divided)) > kCountTolerance)
+          throw WallError("has more points in its mitres than were asked for");
         Extruded extruded = extrude_skin(divided);
         attempt.skin = std::move(divided);
         return extruded;
@@ -394,8 +418,8 @@ class ThinMesher {
       if (n > 0) {
         edge_ = edge * kFactors[n];
         Attempt other = make_skin(edge_, kPerRadius);
-        const double off = options_.nodes ? static_cast<double>(other.nodes) / static_cast<double>(*options_.nodes) - 1 : 0;
-        if (std::abs(off) <= kCountTolerance) attempt = std::move(other);
+        const bool is_counted_later = divides_ && has_divided_;  // make_room() changes how edges are divided
+        if (is_counted_later || std::abs(calc_miss(other.skin)) <= kCountTolerance) attempt = std::move(other);
       }
       attempt.skin = make_room(attempt.skin, places_, find_ways_out(attempt.skin), levels_);
     }
@@ -550,6 +574,7 @@ class ThinMesher {
   std::optional<WallSource> low_source_;
   SkinPlaces places_;
   int order_, layers_;
+  bool divides_ = true, has_divided_ = false;  // mitres
   double lost_ = 0;
 };
 

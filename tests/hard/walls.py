@@ -215,7 +215,7 @@ def corners():
 def closed_box():
     # Elements in the mitres of folds are as fine as elsewhere: otherwise finer meshes converge to another body.
     keys = {"band_hz": (20, 40000), "max_modes": 9}
-    words = ("--wall", BOX_WALL_M, "--method", "extrude", "--nodes", 50000)
+    words = ("--wall", BOX_WALL_M, "--method", "extrude", "--nodes", 60000)
     freq_hz, report = solve(make_box(BOX_M), *words, **keys)
     far = np.abs(1200 * np.log2(freq_hz / get_reference("closed box")))
     hold("closed_box", (far / report["bars"]).max(), 1, "distance from the lattice of a known shape over the error bar")
