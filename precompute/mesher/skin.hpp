@@ -11,7 +11,7 @@
 
 namespace carillon::mesher {
 
-/// Point in a mitre: on an edge from `fold` to `end`, by which the wall's other side is interpolated.
+/// Interpolated point of a mitre, on an edge from `fold` to `end`.
 struct MitrePoint {
   std::int32_t point = 0, fold = 0, end = 0;
   double part = 0;  // of the edge, from the fold
@@ -62,7 +62,7 @@ inline constexpr double kMinSine = 0.3;
 using RingDistance = std::function<double(const LeavingEdge& edge)>;
 Skin add_rings(const Skin& skin, const SkinPlaces& places, const RingDistance& distance_m);
 
-/// Splits the edges that leave these points on folds to lengths near `edge_m`, so that elements in mitres are as fine as elsewhere.
+/// Divides the mitres at marked points of folds into elements of about `edge_m`.
 Skin divide_mitres(const Skin& skin, const SkinPlaces& places, double edge_m, const std::vector<char>& is_mitred);
 
 /// Moves points and flips edges in corners between the mitres of several folds, so that no copy of a triangle, with points `levels_m` along

@@ -64,7 +64,7 @@ Skin divide_mitres(const Skin& start, const SkinPlaces& places, double edge_m, c
   SkinEditor skin(start, places, 0);
   const auto& x = skin.get_points();
   const auto along = skin.find_along();
-  // Of a point from the nearest fold at `fold`.
+  // Distance of a point from the folds at `fold`.
   const auto calc_distance = [&](std::int32_t fold, std::int32_t point) {
     const Vec3 way = x[point] - x[fold];
     double least = norm(way);

@@ -309,9 +309,9 @@ class ThinMesher {
     const double edge = edge_;
     try {
       run();
-    } catch (const std::exception&) {
+    } catch (const WallError&) {
       if (!has_divided_) throw;
-      divides_ = false;  // a sharp fold has no space for more points
+      divides_ = false;  // sharp folds
       edge_ = edge;
       run();
     }
@@ -355,7 +355,7 @@ class ThinMesher {
     return attempt;
   }
 
-  /// Relative difference from the count that was asked for.
+  /// Relative error of the node count.
   double calc_miss(const Skin& skin) const {
     const auto nodes = static_cast<double>(count_mesh_nodes(skin.surface, order_, layers_));
     return options_.nodes ? nodes / static_cast<double>(*options_.nodes) - 1 : 0.0;
@@ -392,11 +392,11 @@ class ThinMesher {
       if (std::abs(next / edge_ - 1) < 1e-3) break;
       edge_ = next;
     }
-    if (std::abs(nearest / asked - 1) > kCountTolerance)
-      throw CountRefusal(fmt::format("{}: {} nodes cannot be met within 10 %: the nearest mesh of this wall has {:.0f}; ask for that many",
-                                     options_.surface.string(), *options_.nodes, nearest),
-                         std::llround(nearest));
-    return best;
+    if (std::abs(nearest / asked - 1) <= kCountTolerance) return best;
+    if (divides_ && has_divided_) throw WallError("has no divided mitres for this count");
+    throw CountRefusal(fmt::format("{}: {} nodes cannot be met within 10 %: the nearest mesh of this wall has {:.0f}; ask for that many",
+                                   options_.surface.string(), *options_.nodes, nearest),
+                       std::llround(nearest));
   }
 
   /// Corner triangles between fold mitres need space for both sides of the wall; other edge lengths may provide it.
@@ -418,8 +418,7 @@ class ThinMesher {
       if (n > 0) {
         edge_ = edge * kFactors[n];
         Attempt other = make_skin(edge_, kPerRadius);
-        const bool is_counted_later = divides_ && has_divided_;  // make_room() changes how edges are divided
-        if (is_counted_later || std::abs(calc_miss(other.skin)) <= kCountTolerance) attempt = std::move(other);
+        if ((divides_ && has_divided_) || std::abs(calc_miss(other.skin)) <= kCountTolerance) attempt = std::move(other);
       }
       attempt.skin = make_room(attempt.skin, places_, find_ways_out(attempt.skin), levels_);
     }

@@ -34,7 +34,7 @@ constexpr double kRoughGrowth = 3.0;    // and while an estimate is rough
 constexpr double kLayered = 0.5;        // of the estimate of the widest bar: tractions, of which one layer leaves the most
 constexpr double kLayeredGrowth = 1.1;  // of the nodes with the second layer: the edges in the plane become longer
 constexpr double kApart = 0.5;          // maximum, of the corrections until then, so that the next mesh is far enough for a verdict,
-constexpr double kApartSingular = 0.6;  // and from one with inward edges
+constexpr double kApartSingular = 0.6;  // the same next to inward edges
 constexpr double kSingular = 0.25;      // of the estimate of the widest bar: at inward edges
 constexpr double kMinStep = 0.9;        // maximum: nearly equal edges give no new information
 constexpr int kMaxCounts = 6;           // node counts tried per trial
@@ -185,7 +185,7 @@ bool Search::are_reliable() const {
                              [&](std::size_t m) { return bank::is_reliable(corrections.correction[m]); });
 }
 
-/// Of the mode with the widest bar; null if there is no mode.
+/// Parts of the widest bar; null without modes.
 const error_bars::ErrorParts* Search::find_widest() const {
   const error_bars::ErrorBars& bars = current_.solved.errors.bars;
   const std::vector<std::size_t> listed = find_bank_modes(run_.job, bars.corrected);
