@@ -78,10 +78,12 @@ class UnvReader {
         if (i % 8 == 0) record = lines_.next("the elements");
         if (expected > 0) nodes.push_back(nodes_.find(field<std::int64_t>(record, i % 8, "a node of an element")));
       }
-      if (type == kUnvTet4) model_.tets.push_back(std::move(nodes));
-      if (type != kUnvTet10) continue;
-      std::vector<std::size_t>& tet = model_.tets.emplace_back();
-      for (const int at : kRoundBase) tet.push_back(nodes[at]);
+      if (type == kUnvTet4) {
+        model_.tets.push_back(std::move(nodes));
+      } else if (type == kUnvTet10) {
+        std::vector<std::size_t>& tet = model_.tets.emplace_back();
+        for (const int at : kRoundBase) tet.push_back(nodes[at]);
+      }
     }
   }
 

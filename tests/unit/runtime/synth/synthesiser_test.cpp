@@ -422,13 +422,15 @@ TEST(Synthesiser, TakesEventsFromManyThreadsWhileItPlays) {
   EXPECT_GE(synthesiser.get_counters().strikes, 300);
 }
 
-// Sensors come, are read by another thread, and their bodies go during playback (for a data race detector).
+// Sensors come and are read by another thread, and bodies go, during playback (for a data race detector). The sensor of a removed body is
+// not read any more: another may take its number.
 TEST(Synthesiser, SensorsAreAddedAndReadDuringPlayback) {
   const bank::Bank bank = testing::make_cube_bank({{400.0, 30.0}, {900.0, 60.0}});
   const auto model = Model::make(bank, {.rate_hz = kRate});
   Synthesiser synthesiser(SynthesiserOptions{.rate_hz = kRate});
   std::atomic<bool> stops{false};
-  std::atomic<int> known{0};
+  std::array<std::atomic<int>, 40> kept{};  // numbers of the sensors whose bodies stay
+  std::atomic<int> kept_count{0};
   std::thread audio([&] {
     std::vector<float> left(64), right(64);
     const std::array<float*, 2> out{left.data(), right.data()};
@@ -442,22 +444,25 @@ TEST(Synthesiser, SensorsAreAddedAndReadDuringPlayback) {
   std::thread reader([&] {
     std::vector<double> samples(4096);
     while (!stops) {
-      for (int sensor = 0; sensor < known; ++sensor) read += synthesiser.find_sensor(sensor)->read(samples);
+      for (int i = 0; i < kept_count; ++i) read += synthesiser.find_sensor(kept[i])->read(samples);
       std::this_thread::yield();
     }
   });
-  while (!stops) {
-    if (known < 60 && !synthesiser.is_full()) {
-      const int body = synthesiser.add_body(model);
-      known = synthesiser.add_sensor(body, bank, {.triangle = 3, .rate_hz = known % 2 == 0 ? 0.0 : 4000.0}) + 1;
-      synthesiser.push(events::Impulse{.time_s = synthesiser.get_horizon_s(), .body = body, .impulse_n_s = {0.0, 0.0, 1.0}});
-      if (known % 3 == 0) synthesiser.remove_body(body);
+  for (int added = 0; !stops; synthesiser.collect(), std::this_thread::yield()) {
+    if (kept_count == static_cast<int>(kept.size()) || synthesiser.is_full()) continue;
+    const int body = synthesiser.add_body(model);
+    const int sensor = synthesiser.add_sensor(body, bank, {.triangle = 3, .rate_hz = added % 2 == 0 ? 0.0 : 4000.0});
+    synthesiser.push(events::Impulse{.time_s = synthesiser.get_horizon_s(), .body = body, .impulse_n_s = {0.0, 0.0, 1.0}});
+    if (++added % 3 == 0) {
+      synthesiser.remove_body(body);
+    } else {
+      kept[kept_count] = sensor;
+      ++kept_count;
     }
-    synthesiser.collect();
-    std::this_thread::yield();
   }
   audio.join();
   reader.join();
+  EXPECT_EQ(kept_count, static_cast<int>(kept.size()));
   EXPECT_GT(read, 1000U);
 }
 
