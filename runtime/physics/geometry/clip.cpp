@@ -6,6 +6,7 @@
 // "Real-Time Collision Detection" (2005), 5.1.9.
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "runtime/physics/geometry/polyhedron.hpp"
 #include "runtime/physics/geometry/reduce.hpp"
@@ -19,10 +20,17 @@ constexpr double kCoplanarCosine = 0.9998;     // cos(1 degree)
 constexpr double kCoplanarStepM = 3e-6;        // m; facets this flush count as coplanar
 constexpr double kFacetOverhangRatio = 1e-5;   // fraction of the size: permitted overhang of a corner beyond a facet
 
-/// Polyhedron b in the frame of a.
+/// Polyhedron b in the frame of a. One block of memory, as this is made for every search.
 struct Turned {
-  std::vector<Vec3> corners, normals, arcs;
-  std::vector<double> offsets;
+  std::vector<Vec3> room;
+  std::span<Vec3> corners, normals, arcs;
+
+  explicit Turned(const Polyhedron& b) : room(b.corners.size() + b.normals.size() + b.edges.size()) {
+    const std::span<Vec3> all(room);
+    corners = all.first(b.corners.size());
+    normals = all.subspan(corners.size(), b.normals.size());
+    arcs = all.last(b.edges.size());
+  }
 };
 
 struct Axis {
@@ -32,7 +40,7 @@ struct Axis {
   Vec3 normal{};  // from b to a, frame of a
 };
 
-double find_min(const std::vector<Vec3>& points, const Vec3& n) {
+double find_min(std::span<const Vec3> points, const Vec3& n) {
   double min = Box::kFar;
   for (const Vec3& x : points) min = std::min(min, dot(n, x));
   return min;
@@ -49,24 +57,27 @@ struct Vertex {
 class Pair {
  public:
   Pair(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb)
-      : sa_(a), sb_(b), a_(*a.polyhedron()), b_(*b.polyhedron()), fa_(fa), fb_(fb), size_(std::min(a.get_size_m(), b.get_size_m())) {
+      : sa_(a),
+        sb_(b),
+        a_(*a.polyhedron()),
+        b_(*b.polyhedron()),
+        fa_(fa),
+        fb_(fb),
+        t_(b_),
+        size_(std::min(a.get_size_m(), b.get_size_m())) {
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         rotation_[i][j] = 0.0;
         for (int k = 0; k < 3; ++k) rotation_[i][j] += fa.rotation[k][i] * fb.rotation[k][j];
       }
     offset_ = to_body(fa, fb.position_m);
-    t_.corners.reserve(b_.corners.size());
-    for (const Vec3& x : b_.corners) t_.corners.push_back(rotation_ * x + offset_);
-    for (std::size_t i = 0; i < b_.normals.size(); ++i) {
-      t_.normals.push_back(rotation_ * b_.normals[i]);
-      t_.offsets.push_back(b_.offsets_m[i] + dot(t_.normals[i], offset_));
-    }
+    for (std::size_t i = 0; i < b_.corners.size(); ++i) t_.corners[i] = rotation_ * b_.corners[i] + offset_;
+    for (std::size_t i = 0; i < b_.normals.size(); ++i) t_.normals[i] = rotation_ * b_.normals[i];
   }
 
   /// Gap along one axis; used to retest the axis of the previous search.
   double calc_gap(int kind, int i) const {
-    return kind == 0 ? find_min(t_.corners, a_.normals[i]) - a_.offsets_m[i] : find_min(a_.corners, t_.normals[i]) - t_.offsets[i];
+    return kind == 0 ? find_min(t_.corners, a_.normals[i]) - a_.offsets_m[i] : find_min(a_.corners, t_.normals[i]) - calc_offset(i);
   }
 
   Axis find_facet_axis(int kind, double enough) const {
@@ -86,7 +97,7 @@ class Pair {
   std::vector<Axis> find_seams() const {
     std::vector<Axis> seams;
     for (const int kind : {0, 1}) {
-      const std::vector<Vec3>&mine = kind == 0 ? a_.normals : t_.normals, &theirs = kind == 0 ? t_.normals : a_.normals;
+      const std::span<const Vec3> mine = get_normals(kind == 0), theirs = get_normals(kind != 0);
       for (std::size_t i = 0; i < mine.size(); ++i) {
         const double gap = calc_gap(kind, static_cast<int>(i));
         if (std::abs(gap) > kCoplanarStepM) continue;
@@ -101,19 +112,22 @@ class Pair {
   }
 
   Axis find_edge_axis() {
-    for (const Polyhedron::Edge& e : b_.edges) t_.arcs.push_back(rotation_ * e.arc);
+    for (std::size_t j = 0; j < b_.edges.size(); ++j) t_.arcs[j] = rotation_ * b_.edges[j].arc;
+    std::vector<double> along(a_.normals.size() * b_.edges.size() + b_.normals.size());  // of a's normals by b's arcs,
+    double* const along_a = along.data() + a_.normals.size() * b_.edges.size();          // of b's normals by an arc of a
+    for (std::size_t f = 0, k = 0; f < a_.normals.size(); ++f)
+      for (const Vec3& arc : t_.arcs) along[k++] = dot(a_.normals[f], arc);
     Axis best;
     for (std::size_t i = 0; i < a_.edges.size(); ++i) {
       const Polyhedron::Edge& ea = a_.edges[i];
       const Vec3 &na0 = a_.normals[ea.facets[0]], &na1 = a_.normals[ea.facets[1]];
+      const double *const along0 = &along[ea.facets[0] * b_.edges.size()], *const along1 = &along[ea.facets[1] * b_.edges.size()];
+      for (std::size_t f = 0; f < b_.normals.size(); ++f) along_a[f] = dot(t_.normals[f], ea.arc);
       for (std::size_t j = 0; j < b_.edges.size(); ++j) {
         const Polyhedron::Edge& eb = b_.edges[j];
         // Arcs (na0, na1) and (-nb0, -nb1) intersect.
-        const Vec3 &nb0 = t_.normals[eb.facets[0]], &nb1 = t_.normals[eb.facets[1]];
-        const double c = dot(nb0, ea.arc), d = dot(nb1, ea.arc);
-        if (c * d >= 0.0) continue;
-        const double p = dot(na0, t_.arcs[j]), q = dot(na1, t_.arcs[j]);
-        if (p * q >= 0.0 || c * q >= 0.0) continue;
+        const double c = along_a[eb.facets[0]], d = along_a[eb.facets[1]], p = along0[j], q = along1[j];
+        if (c * d >= 0.0 || p * q >= 0.0 || c * q >= 0.0) continue;
         Vec3 n = cross(ea.arc, t_.arcs[j]);
         const double length2 = norm2(n);
         if (length2 < 1e-6 * norm2(ea.arc) * norm2(t_.arcs[j])) continue;
@@ -129,15 +143,16 @@ class Pair {
   void clip(const Axis& axis, double margin, std::vector<Touch>& out) const {
     const bool on_a = axis.kind == 0;  // reference facet
     const Polyhedron &mine = on_a ? a_ : b_, &theirs = on_a ? b_ : a_;
-    const std::vector<Vec3>&my_corners = on_a ? a_.corners : t_.corners, &their_corners = on_a ? t_.corners : a_.corners;
-    const std::vector<Vec3>& their_normals = on_a ? t_.normals : a_.normals;
-    const Vec3& n = on_a ? a_.normals[axis.i] : t_.normals[axis.i];
-    const double offset = on_a ? a_.offsets_m[axis.i] : t_.offsets[axis.i];
+    const std::span<const Vec3> my_corners = get_corners(on_a), their_corners = get_corners(!on_a), their_normals = get_normals(!on_a);
+    const Vec3& n = get_normals(on_a)[axis.i];
+    const double offset = on_a ? a_.offsets_m[axis.i] : calc_offset(axis.i);
     int facing = 0;
     for (std::size_t i = 1; i < their_normals.size(); ++i)
       if (dot(their_normals[i], n) < dot(their_normals[facing], n)) facing = static_cast<int>(i);
     std::vector<Vertex> polygon, next;
     const auto& loop = theirs.loops[facing];
+    polygon.reserve(loop.size() + mine.loops[axis.i].size());
+    next.reserve(loop.size() + mine.loops[axis.i].size());
     for (std::size_t i = 0; i < loop.size(); ++i) {
       Vertex v;
       v.x = their_corners[loop[i]];
@@ -263,7 +278,11 @@ class Pair {
   double size() const { return size_; }
 
  private:
+  std::span<const Vec3> get_corners(bool of_a) const { return of_a ? std::span<const Vec3>(a_.corners) : t_.corners; }
+  std::span<const Vec3> get_normals(bool of_a) const { return of_a ? std::span<const Vec3>(a_.normals) : t_.normals; }
   Vec3 axis_world(const Vec3& n) const { return fa_.rotation * n; }
+  /// Of a facet of b, in the frame of a.
+  double calc_offset(int facet) const { return b_.offsets_m[facet] + dot(t_.normals[facet], offset_); }
 
   const Shape &sa_, &sb_;
   const Polyhedron &a_, &b_;

@@ -306,11 +306,11 @@ TouchSets::Ahead TouchSets::complete_polyhedra(Pair& pair, const geometry::Frame
   return {true, depth_m};
 }
 
-/// Deepest touch of two polyhedra at the frames `a` and `b`, with the bodies apart.
+/// Deepest touch of two polyhedra at the frames `a` and `b`, with the bodies apart. None if it is less than kMissingDepthM deep.
 std::optional<geometry::Touch> TouchSets::find_deepest(const Pair& pair, const geometry::Frame& a, const geometry::Frame& b) {
   geometry::PairMemory memory;
   memory.axis = pair.memory.axis;
-  geometry::find_touches(*bodies_.get_shape(pair.a), move(a, pair.apart_m), *bodies_.get_shape(pair.b), b, 0.0, memory, found_);
+  geometry::find_touches(*bodies_.get_shape(pair.a), move(a, pair.apart_m), *bodies_.get_shape(pair.b), b, -kMissingDepthM, memory, found_);
   const auto deepest = std::min_element(found_.begin(), found_.end(), [](const auto& x, const auto& y) { return x.gap_m < y.gap_m; });
   return deepest == found_.end() ? std::nullopt : std::optional(*deepest);
 }
