@@ -80,21 +80,12 @@ std::vector<Pieces> list_later(const impact::Modes& modes, const std::vector<Mod
   return later;
 }
 
-void turn_undamped(const impact::Modes& modes, ModalState& state, double time_s) {
-  for (std::size_t i = 0; i < state.q.size(); ++i) {
-    const double omega = modes.get_omega()[i], c = std::cos(omega * time_s), s = std::sin(omega * time_s);
-    const double before = state.q[i];
-    state.q[i] = omega > 0.0 ? c * before + s / omega * state.q_dot[i] : before + time_s * state.q_dot[i];
-    state.q_dot[i] = c * state.q_dot[i] - omega * s * before;
-  }
-}
-
 }  // namespace
 
 const ModalState& Ringing::move_to(const impact::Modes& modes, double time_s) {
   if (!state_.q.empty()) {
     if (time_s > time_s_) modes.move_freely(state_.q, state_.q_dot, time_s - time_s_);
-    if (time_s < time_s_) turn_undamped(modes, state_, time_s - time_s_);
+    if (time_s < time_s_) modes.turn(state_.q, state_.q_dot, time_s - time_s_);
   }
   time_s_ = time_s;
   return state_;

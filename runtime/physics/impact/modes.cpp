@@ -143,4 +143,12 @@ void Modes::move_freely(std::span<double> q, std::span<double> q_dot, double tim
   }
 }
 
+void Modes::turn(std::span<double> q, std::span<double> q_dot, double time_s) const {
+  for (std::size_t i = 0; i < omega_.size(); ++i) {
+    const double c = std::cos(omega_[i] * time_s), s = std::sin(omega_[i] * time_s), before = q[i];
+    q[i] = omega_[i] > 0.0 ? c * before + s / omega_[i] * q_dot[i] : before + time_s * q_dot[i];
+    q_dot[i] = c * q_dot[i] - omega_[i] * s * before;
+  }
+}
+
 }  // namespace carillon::impact

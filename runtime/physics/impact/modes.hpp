@@ -63,6 +63,8 @@ class Modes {
   double calc_energy(std::span<const double> q, std::span<const double> q_dot) const;
   /// Advances a modal state by `time_s` >= 0 without a force, exactly.
   void move_freely(std::span<double> q, std::span<double> q_dot, double time_s) const;
+  /// The same without damping, also backwards.
+  void turn(std::span<double> q, std::span<double> q_dot, double time_s) const;
 
  private:
   std::vector<double> omega_, decay_, tail_omega_, tail_decay_;

@@ -295,7 +295,7 @@ void ModalImpacts::add_contact(ModalImpact& modal, Contact& touch, double sag_m,
 }
 
 /// An ended impact, and the modes of its bodies, may be ahead by a part of its step: the next impact begins at that time. Moves the bodies
-/// there; returns the time.
+/// there, or the modes back; returns the time.
 double ModalImpacts::fly_to_modes(const std::vector<Hit>& hits, const std::vector<int>& order) {
   const double now_s = bodies_.get_time();
   double start_s = now_s;
@@ -306,9 +306,13 @@ double ModalImpacts::fly_to_modes(const std::vector<Hit>& hits, const std::vecto
       if (bodies_.moves(body) && bodies_.find_articulation(body) == nullptr) moving.insert(body);
     }
   if (!(start_s > now_s)) return now_s;
-  // Fast bodies would fly into each other: they begin now, with the modes of that time.
+  const bool is_fast = std::any_of(order.begin(), order.end(), [&](int n) {  // they would fly into each other
+    return bodies_.calc_approach(hits[n].touch, hits[n].a, hits[n].b) * (start_s - now_s) > kMaxDepthM;
+  });
   for (const int n : order)
-    if (bodies_.calc_approach(hits[n].touch, hits[n].a, hits[n].b) * (start_s - now_s) > kMaxDepthM) return now_s;
+    for (const int body : {hits[n].a, hits[n].b})
+      if (is_fast && bodies_.has_modes(body)) states_.turn_back(body, now_s);
+  if (is_fast) return now_s;
   for (const int body : moving) {
     bodies_.state(body) = fly(bodies_.solid(body), bodies_.state(body), bodies_.gravity(), start_s - now_s);
     bodies_.place(body);

@@ -52,6 +52,13 @@ ModalState& ModalStates::advance(int body, double time_s) {
   return state;
 }
 
+void ModalStates::turn_back(int body, double time_s) {
+  ModalState& state = states_[body];
+  if (state.q.empty() || !(state.time_s > time_s)) return;
+  bodies_.solid(body).modes->turn(state.q, state.q_dot, time_s - state.time_s);
+  state.time_s = time_s;
+}
+
 std::vector<double> calc_amplitudes(const impact::Modes& modes, const std::vector<double>& q, const std::vector<double>& q_dot) {
   const std::vector<double>& omega = modes.get_omega();
   std::vector<double> amplitudes(q.size());

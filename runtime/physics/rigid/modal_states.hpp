@@ -32,6 +32,8 @@ class ModalStates {
 
   /// Advances freely to a time, unless it is later already; books damping losses.
   ModalState& advance(int body, double time_s);
+  /// Returns the modes of a body, without damping, to a time that they have passed.
+  void turn_back(int body, double time_s);
   const ModalState& get(int body) const { return states_[body]; }
   void set(int body, ModalState state) {
     states_[body] = std::move(state);

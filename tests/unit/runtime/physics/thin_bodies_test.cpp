@@ -250,7 +250,7 @@ TEST_P(Falling, ModalEnergyBelowLossOfMotion) {
       const double q = sum.imag() / damped, v = (p * sum).imag() / damped;
       played_j += 0.5 * (v * v + lambda * q * q);
     }
-    EXPECT_NEAR(played_j, energy.modes_j, 0.02 * energy.modes_j) << turn;
+    EXPECT_NEAR(played_j, energy.modes_j, 0.002 * energy.modes_j) << turn;
     const double speed = norm(last.velocity_m_s);
     EXPECT_LT(played_j, plate.rigid.mass_kg * (9.81 * (0.6 - last.position_m[2]) - 0.5 * speed * speed)) << turn;
   }
