@@ -57,8 +57,8 @@ SECONDS, ASLEEP_S, FLOOR_M = 2.0, 0.02, 0.2
 BOUNDS = {
     "rests": (25e-6, (25e-6, 25e-6)),
     "unexplained": (1e-4, (1.5e-4, 1.5e-4)),
-    "lifted": (1e-2, (3e-2, 6e-2)),
-    "books": (1e-2, (3e-2, 6e-2)),
+    "lifted": (1e-2, (2e-2, 4e-2)),
+    "books": (1e-2, (2e-2, 4e-2)),
     "hits": (100, (200, 200)),
 }
 # A coin of glass whirls until it lies, from twelve starts 1 um apart. Struck once a step within impacts it had 31 to 145 hits/s.

@@ -19,6 +19,9 @@ constexpr double kMinMoveRatio = 0.02;        // fraction of the size: minimum d
 constexpr int kMaxFollowed = 12;              // contacts per impact, including open ones
 constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
 constexpr int kMaxRolled = 8;                 // slow pulses in a row, each at another place: the impact has become rolling
+constexpr double kFarYieldedM = 1e-4;         // m; beyond, contacts are followed more often:
+constexpr double kMinPartS = 2e-5;            // s
+constexpr double kMaxPartM = 5e-5;            // m; maximum way of a surface between
 constexpr double kRoundingRatio = 1e-12;      // of velocities
 constexpr double kQuietAfterImpactS = 5e-3;   // s; after the end of an impact, without slow impacts of the pair
 
@@ -270,6 +273,21 @@ void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches)
   }
 }
 
+double ModalImpacts::limit_part(const Step& step, double length_s) const {
+  for (const ModalImpact& modal : impacts_) {
+    if (std::none_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; })) continue;
+    double farthest_m = 0.0, fastest_m_s = 0.0;
+    for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) farthest_m = std::max(farthest_m, modal.impact->calc_depth(k));
+    for (const int body : modal.bodies) {
+      farthest_m = std::max(farthest_m, bodies_.get_swing(body));
+      fastest_m_s = std::max(fastest_m_s, bodies_.calc_speed(body));
+    }
+    if (farthest_m < kFarYieldedM) continue;
+    length_s = std::min(length_s, std::max(kMinPartS, kMaxPartM / fastest_m_s));
+  }
+  return length_s;
+}
+
 bool ModalImpacts::may_meet_others(const Step& step, double length_s, TouchSets& touches) {
   for (Pair* pair : step.island().pairs) {
     if (pair->cord >= 0 || pair->b < 0) continue;
@@ -478,12 +496,13 @@ void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches
   if (!modal.impact->has_ended()) ++ledger_.costs.ended_impacts;
   ledger_.costs.longest_impact_s = std::max(ledger_.costs.longest_impact_s, modal.impact->get_time());
   const impact::Books books = modal.impact->get_books();
-  // Yielded compression retains the work of its recovery against gravity.
+  // Of what it has lost, an impact that ends compressed retains the work of its recovery against gravity.
   double deepest_m = 0.0, weight_n = 0.0;
   for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) deepest_m = std::max(deepest_m, modal.impact->calc_depth(k));
   for (const impact::Body& b : bodies) weight_n += b.mass_kg * norm(bodies_.gravity());
-  const double kept_j = std::clamp(weight_n * deepest_m - books.spring, 0.0, std::max(books.yielded, 0.0));
-  ledger_.lose(books.dissipated_modes + books.dissipated_contact + books.yielded - kept_j + books.dissipated_friction + books.above_band);
+  const double lost_j = books.dissipated_modes + books.dissipated_contact + books.yielded,
+               kept_j = std::clamp(weight_n * deepest_m - books.spring, 0.0, std::max(lost_j, 0.0));
+  ledger_.lose(lost_j - kept_j + books.dissipated_friction + books.above_band);
   for (int k = 0; const impact::Body& b : bodies) {
     const int body = modal.bodies[k++];
     bodies_.set_in_impact(body, false);

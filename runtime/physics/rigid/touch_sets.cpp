@@ -102,7 +102,7 @@ void TouchSets::search(Pair& pair, double step_s, double least_m_s) {
   const geometry::Frame frame_a = bodies_.get_frame(pair.a);
   if (pair.b < 0)
     geometry::find_ground_touches(a, frame_a, bodies_.ground()->height_m, margin_m, pair.memory, found_,
-                                  bodies_.is_moved_by_impact(pair.a));
+                                  bodies_.is_moved_by_impact(pair.a) || bodies_.get_swing(pair.a) > kMaxDepthM);
   else
     geometry::find_touches(a, move(frame_a, pair.apart_m), *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b), margin_m, pair.memory,
                            found_);
@@ -402,7 +402,7 @@ void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
   pair.travelled_m += calc_way(pair, time_s, step_s) + Pair::kMovedM;
   if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecayS);
   limit_apart(pair);
-  if (pair.sag_m < kDeepM) lose_stored(pair);
+  if (calc_explained_depth(pair) < kDeepM) lose_stored(pair);
 }
 
 void TouchSets::part(Pair& pair, double depth_m, const Vec3& normal) const {
