@@ -19,9 +19,9 @@ constexpr double kMinMoveRatio = 0.02;        // fraction of the size: minimum d
 constexpr int kMaxFollowed = 12;              // contacts per impact, including open ones
 constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
 constexpr int kMaxRolled = 8;                 // slow pulses in a row, each at another place: the impact has become rolling
-constexpr double kFarYieldedM = 1e-4;         // m; beyond, contacts are followed more often:
-constexpr double kMinPartS = 2e-5;            // s
-constexpr double kMaxPartM = 5e-5;            // m; maximum way of a surface between
+constexpr double kFarYieldedM = 2e-4;         // m; where surfaces yield or swing more, contacts are followed
+constexpr double kMaxPartM = 5e-5;            // m; after every such way of a surface,
+constexpr double kMinPartS = 2e-5;            // s; but not more often
 constexpr double kRoundingRatio = 1e-12;      // of velocities
 constexpr double kQuietAfterImpactS = 5e-3;   // s; after the end of an impact, without slow impacts of the pair
 
@@ -32,6 +32,8 @@ void push(impact::Impact& impact, int n, const impact::Body& b, const Vec3& velo
   if (norm(change) > kRoundingRatio * norm(b.velocity_m_s) || norm(spin_change) > kRoundingRatio * norm(b.spin_rad_s))
     impact.push(n, change, spin_change);
 }
+
+double calc_lost(const impact::Books& books) { return books.dissipated_modes + books.dissipated_contact; }
 
 bool has_contact(const ModalImpact& modal, const Pair& pair) {
   return std::any_of(modal.contacts.begin(), modal.contacts.end(), [&](const ModalContact& c) { return c.is_between(pair.a, pair.b); });
@@ -380,6 +382,7 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
       s.momentum = rotation * (bodies_.solid(body).inertia_kg_m2 * (transpose(rotation) * bodies[k].spin_rad_s));
     }
     keep_pulses(modal);
+    (void)retain(modal);
     // Once per window, to avoid many short pieces
     if (to_s >= window_end_s - 1e-9)
       for (ModalContact& contact : modal.contacts) report(contact);
@@ -487,6 +490,20 @@ void ModalImpacts::report(ModalContact& contact) {
   forces.continues = true;
 }
 
+/// Keeps of the losses since the last call the work that compressed contacts need to recover against gravity. Returns this work, beyond
+/// the energy of the springs.
+double ModalImpacts::retain(ModalImpact& modal) const {
+  const impact::Books books = modal.impact->get_books();
+  double deepest_m = 0.0, weight_n = 0.0;
+  for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) deepest_m = std::max(deepest_m, modal.impact->calc_depth(k));
+  for (const int body : modal.bodies)
+    if (bodies_.moves(body)) weight_n += bodies_.solid(body).mass_kg * norm(bodies_.gravity());
+  const double lost_j = calc_lost(books), more_j = lost_j - std::exchange(modal.lost_j, lost_j);
+  const double work_j = std::max(0.0, weight_n * deepest_m - books.spring);
+  modal.retained_j = std::clamp(work_j - books.yielded, 0.0, std::max(0.0, modal.retained_j + more_j));
+  return work_j;
+}
+
 /// Returns the modal states of an impact's bodies, which may be ahead of `time_s` by part of its step.
 void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches) {
   keep_pulses(modal);
@@ -496,13 +513,8 @@ void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches
   if (!modal.impact->has_ended()) ++ledger_.costs.ended_impacts;
   ledger_.costs.longest_impact_s = std::max(ledger_.costs.longest_impact_s, modal.impact->get_time());
   const impact::Books books = modal.impact->get_books();
-  // Of what it has lost, an impact that ends compressed retains the work of its recovery against gravity.
-  double deepest_m = 0.0, weight_n = 0.0;
-  for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) deepest_m = std::max(deepest_m, modal.impact->calc_depth(k));
-  for (const impact::Body& b : bodies) weight_n += b.mass_kg * norm(bodies_.gravity());
-  const double lost_j = books.dissipated_modes + books.dissipated_contact + books.yielded,
-               kept_j = std::clamp(weight_n * deepest_m - books.spring, 0.0, std::max(lost_j, 0.0));
-  ledger_.lose(lost_j - kept_j + books.dissipated_friction + books.above_band);
+  const double work_j = retain(modal), kept_j = std::clamp(books.yielded + modal.retained_j, 0.0, work_j);
+  ledger_.lose(calc_lost(books) + books.yielded - kept_j + books.dissipated_friction + books.above_band);
   for (int k = 0; const impact::Body& b : bodies) {
     const int body = modal.bodies[k++];
     bodies_.set_in_impact(body, false);
@@ -533,8 +545,8 @@ void ModalImpacts::add_to(Books& books) const {
   for (const ModalImpact& modal : impacts_) {
     const impact::Books inside = modal.impact->get_books();
     books.modes_j += inside.modal;
-    books.springs_j += inside.spring + inside.yielded;
-    books.lost_j += inside.dissipated_modes + inside.dissipated_contact + inside.dissipated_friction + inside.above_band;
+    books.springs_j += inside.spring + inside.yielded + modal.retained_j;
+    books.lost_j += calc_lost(inside) - modal.retained_j + inside.dissipated_friction + inside.above_band;
   }
 }
 

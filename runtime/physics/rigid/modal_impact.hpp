@@ -36,7 +36,9 @@ struct ModalImpact {
   double start_s = 0.0;
   std::vector<int> bodies;  // in the order of `impact`
   std::vector<ModalContact> contacts;
-  int rolled = 0;  // slow pulses in a row that ended because their contact moved to another place
+  int rolled = 0;           // slow pulses in a row that ended because their contact moved to another place
+  double retained_j = 0.0;  // of its losses, for the recovery of its contacts against gravity
+  double lost_j = 0.0;      // in contacts and modes, at the last update of retained_j
 };
 
 /// Impacts integrated with the modes of their bodies (runtime/physics/impact) over as many small steps as needed. They determine the motion
@@ -69,7 +71,7 @@ class ModalImpacts {
   void follow(const Step& step, double length_s, TouchSets& touches);
   /// Begins impacts of ringing bodies before contact of their deformed surfaces in a step.
   void begin_early(const Step& step, double length_s, const Instants& instants);
-  /// Longest part of a step of this length [s]: bodies that yield far turn and bend on while their contacts stay.
+  /// Length of the next part of a step with this rest [s], short where surfaces yield or swing far.
   double limit_part(const Step& step, double length_s) const;
   /// True if a body moved by an impact may meet a body outside of it within a step.
   bool may_meet_others(const Step& step, double length_s, TouchSets& touches);
@@ -133,6 +135,7 @@ class ModalImpacts {
   void undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s);
   void keep_pulses(ModalImpact& modal);
   void report(ModalContact& contact);
+  double retain(ModalImpact& modal) const;
   void release(ModalImpact& modal, double time_s, TouchSets& touches);
   void end(ModalImpact& modal, TouchSets& touches);
 
