@@ -113,20 +113,21 @@ class Pair {
 
   Axis find_edge_axis() {
     for (std::size_t j = 0; j < b_.edges.size(); ++j) t_.arcs[j] = rotation_ * b_.edges[j].arc;
-    std::vector<double> along(a_.normals.size() * b_.edges.size() + b_.normals.size());  // of a's normals by b's arcs,
-    double* const along_a = along.data() + a_.normals.size() * b_.edges.size();          // of b's normals by an arc of a
-    for (std::size_t f = 0, k = 0; f < a_.normals.size(); ++f)
-      for (const Vec3& arc : t_.arcs) along[k++] = dot(a_.normals[f], arc);
+    const std::size_t count_b = b_.edges.size();
+    // Normals of a times arcs of b, all of them; normals of b times one arc of a.
+    std::vector<double> dots_a(a_.normals.size() * count_b), dots_b(b_.normals.size());
+    for (std::size_t f = 0; f < a_.normals.size(); ++f)
+      for (std::size_t j = 0; j < count_b; ++j) dots_a[f * count_b + j] = dot(a_.normals[f], t_.arcs[j]);
     Axis best;
     for (std::size_t i = 0; i < a_.edges.size(); ++i) {
       const Polyhedron::Edge& ea = a_.edges[i];
       const Vec3 &na0 = a_.normals[ea.facets[0]], &na1 = a_.normals[ea.facets[1]];
-      const double *const along0 = &along[ea.facets[0] * b_.edges.size()], *const along1 = &along[ea.facets[1] * b_.edges.size()];
-      for (std::size_t f = 0; f < b_.normals.size(); ++f) along_a[f] = dot(t_.normals[f], ea.arc);
-      for (std::size_t j = 0; j < b_.edges.size(); ++j) {
+      for (std::size_t f = 0; f < dots_b.size(); ++f) dots_b[f] = dot(t_.normals[f], ea.arc);
+      for (std::size_t j = 0; j < count_b; ++j) {
         const Polyhedron::Edge& eb = b_.edges[j];
         // Arcs (na0, na1) and (-nb0, -nb1) intersect.
-        const double c = along_a[eb.facets[0]], d = along_a[eb.facets[1]], p = along0[j], q = along1[j];
+        const double c = dots_b[eb.facets[0]], d = dots_b[eb.facets[1]];
+        const double p = dots_a[ea.facets[0] * count_b + j], q = dots_a[ea.facets[1] * count_b + j];
         if (c * d >= 0.0 || p * q >= 0.0 || c * q >= 0.0) continue;
         Vec3 n = cross(ea.arc, t_.arcs[j]);
         const double length2 = norm2(n);

@@ -383,8 +383,7 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
     }
     keep_pulses(modal);
     (void)retain(modal);
-    // Once per window, to avoid many short pieces
-    if (to_s >= window_end_s - 1e-9)
+    if (to_s >= window_end_s - 1e-9)  // once per window, to avoid many short pieces
       for (ModalContact& contact : modal.contacts) report(contact);
     const End end = find_end(modal, to_s);
     if (!ended && end == End::none) continue;
