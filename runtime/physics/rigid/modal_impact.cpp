@@ -19,9 +19,6 @@ constexpr double kMinMoveRatio = 0.02;        // fraction of the size: minimum d
 constexpr int kMaxFollowed = 12;              // contacts per impact, including open ones
 constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
 constexpr int kMaxRolled = 8;                 // slow pulses in a row, each at another place: the impact has become rolling
-constexpr double kFarYieldedM = 5e-4;         // m; where surfaces yield or swing more, contacts are followed
-constexpr double kMaxPartM = 5e-5;            // m; after every such way of a surface,
-constexpr double kMinPartS = 2e-5;            // s; but not more often
 constexpr double kRoundingRatio = 1e-12;      // of velocities
 constexpr double kQuietAfterImpactS = 5e-3;   // s; after the end of an impact, without slow impacts of the pair
 
@@ -273,21 +270,6 @@ void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches)
       follow(modal, *pair, fastest_m_s * length_s, length_s, touches);
     }
   }
-}
-
-double ModalImpacts::limit_part(const Step& step, double length_s) const {
-  for (const ModalImpact& modal : impacts_) {
-    if (std::none_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; })) continue;
-    double farthest_m = 0.0, fastest_m_s = 0.0;
-    for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) farthest_m = std::max(farthest_m, modal.impact->calc_depth(k));
-    for (const int body : modal.bodies) {
-      farthest_m = std::max(farthest_m, bodies_.get_swing(body));
-      fastest_m_s = std::max(fastest_m_s, bodies_.calc_speed(body));
-    }
-    if (farthest_m < kFarYieldedM) continue;
-    length_s = std::min(length_s, std::max(kMinPartS, kMaxPartM / fastest_m_s));
-  }
-  return length_s;
 }
 
 bool ModalImpacts::may_meet_others(const Step& step, double length_s, TouchSets& touches) {

@@ -71,8 +71,6 @@ class ModalImpacts {
   void follow(const Step& step, double length_s, TouchSets& touches);
   /// Begins impacts of ringing bodies before contact of their deformed surfaces in a step.
   void begin_early(const Step& step, double length_s, const Instants& instants);
-  /// Length of the next part of a step with this rest [s], short where surfaces yield or swing far.
-  double limit_part(const Step& step, double length_s) const;
   /// True if a body moved by an impact may meet a body outside of it within a step.
   bool may_meet_others(const Step& step, double length_s, TouchSets& touches);
   /// Depth of a pair explained by springs and modes of its impact [m].
