@@ -309,10 +309,12 @@ double ModalImpacts::fly_to_modes(const std::vector<Hit>& hits, const std::vecto
   const bool is_fast = std::any_of(order.begin(), order.end(), [&](int n) {  // they would fly into each other
     return bodies_.calc_approach(hits[n].touch, hits[n].a, hits[n].b) * (start_s - now_s) > kMaxDepthM;
   });
-  for (const int n : order)
-    for (const int body : {hits[n].a, hits[n].b})
-      if (is_fast && bodies_.has_modes(body)) states_.turn_back(body, now_s);
-  if (is_fast) return now_s;
+  if (is_fast) {
+    for (const int n : order)
+      for (const int body : {hits[n].a, hits[n].b})
+        if (bodies_.has_modes(body)) states_.turn_back(body, now_s);
+    return now_s;
+  }
   for (const int body : moving) {
     bodies_.state(body) = fly(bodies_.solid(body), bodies_.state(body), bodies_.gravity(), start_s - now_s);
     bodies_.place(body);

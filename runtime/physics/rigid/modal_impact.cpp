@@ -30,6 +30,13 @@ void push(impact::Impact& impact, int n, const impact::Body& b, const Vec3& velo
     impact.push(n, change, spin_change);
 }
 
+/// Greatest depth explained at a contact [m].
+double calc_deepest(const ModalImpact& modal) {
+  double deepest_m = 0.0;
+  for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) deepest_m = std::max(deepest_m, modal.impact->calc_depth(k));
+  return deepest_m;
+}
+
 double calc_lost(const impact::Books& books) { return books.dissipated_modes + books.dissipated_contact; }
 
 bool has_contact(const ModalImpact& modal, const Pair& pair) {
@@ -292,12 +299,11 @@ bool ModalImpacts::may_meet_others(const Step& step, double length_s, TouchSets&
 
 /// Reason to end an impact before its contacts have separated.
 ModalImpacts::End ModalImpacts::find_end(const ModalImpact& modal, double time_s) {
-  bool is_slow = true, is_deep = false;  // is_slow: also where a body rolls or slides fast
-  for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) {
+  bool is_slow = true;  // also where a body rolls or slides fast
+  for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k)
     is_slow = is_slow && (!(modal.impact->get_compression(k) > 0.0) || std::abs(modal.impact->calc_approach(k)) < kRattleSpeedMS);
-    is_deep = is_deep || modal.impact->calc_depth(k) > kMaxDepthM;
-  }
-  if (is_slow && !is_deep && modal.rolled > kMaxRolled) return End::rolls;  // a deep one would have to be lifted
+  // A deep one would have to be lifted.
+  if (is_slow && modal.rolled > kMaxRolled && calc_deepest(modal) <= kMaxDepthM) return End::rolls;
   return time_s - modal.start_s > (is_slow ? kMaxSlowImpactS : kMaxImpactS) ? End::lasts : End::none;
 }
 
@@ -475,12 +481,11 @@ void ModalImpacts::report(ModalContact& contact) {
 /// the energy of the springs.
 double ModalImpacts::retain(ModalImpact& modal) const {
   const impact::Books books = modal.impact->get_books();
-  double deepest_m = 0.0, weight_n = 0.0;
-  for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) deepest_m = std::max(deepest_m, modal.impact->calc_depth(k));
+  double weight_n = 0.0;
   for (const int body : modal.bodies)
     if (bodies_.moves(body)) weight_n += bodies_.solid(body).mass_kg * norm(bodies_.gravity());
   const double lost_j = calc_lost(books), more_j = lost_j - std::exchange(modal.lost_j, lost_j);
-  const double work_j = std::max(0.0, weight_n * deepest_m - books.spring);
+  const double work_j = std::max(0.0, weight_n * calc_deepest(modal) - books.spring);
   modal.retained_j = std::clamp(work_j - books.yielded, 0.0, std::max(0.0, modal.retained_j + more_j));
   return work_j;
 }
