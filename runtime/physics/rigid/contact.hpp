@@ -87,6 +87,10 @@ struct Pair {
   bool touches() const {
     return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });
   }
+  /// Closed in a modal impact.
+  bool is_pressed() const {
+    return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.presses && c.touch.gap_m <= 0.0; });
+  }
   /// Gap within kDeepM, with or without a force.
   bool has_closed_gap() const {
     return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeepM; });

@@ -19,6 +19,9 @@ constexpr double kMinMoveRatio = 0.02;        // fraction of the size: minimum d
 constexpr int kMaxFollowed = 12;              // contacts per impact, including open ones
 constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
 constexpr int kMaxRolled = 8;                 // slow pulses in a row, each at another place: the impact has become rolling
+constexpr double kFarYieldedM = 1e-3;         // m; where surfaces yield or swing more, contacts are followed
+constexpr double kMaxPartM = 5e-5;            // m; after every such way of a surface,
+constexpr double kMinPartS = 2e-5;            // s; but not more often
 constexpr double kRoundingRatio = 1e-12;      // of velocities
 constexpr double kQuietAfterImpactS = 5e-3;   // s; after the end of an impact, without slow impacts of the pair
 
@@ -35,6 +38,16 @@ double calc_deepest(const ModalImpact& modal) {
   double deepest_m = 0.0;
   for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) deepest_m = std::max(deepest_m, modal.impact->calc_depth(k));
   return deepest_m;
+}
+
+/// Angular momentum of a body after a part of an impact, which turned it with the inertia and the gyroscopic couple of its start: their
+/// work is taken back from the spin.
+Vec3 calc_momentum(const Solid& solid, const Quaternion& turned, const impact::Body& b, const Vec3& gyroscopic_n_m) {
+  const Mat3 rotation = make_rotation(turned);
+  const Vec3 momentum = rotation * (solid.inertia_kg_m2 * (transpose(rotation) * b.spin_rad_s));
+  const double turning_j = 0.5 * dot(b.spin_rad_s, momentum),
+               wanted_j = 0.5 * dot(b.spin_rad_s, b.inertia_kg_m2 * b.spin_rad_s) - dot(gyroscopic_n_m, b.turned_rad);
+  return turning_j > 0.0 && wanted_j > 0.0 ? std::sqrt(wanted_j / turning_j) * momentum : momentum;
 }
 
 double calc_lost(const impact::Books& books) { return books.dissipated_modes + books.dissipated_contact; }
@@ -279,6 +292,21 @@ void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches)
   }
 }
 
+double ModalImpacts::limit_part(const Step& step, double length_s) const {
+  for (const ModalImpact& modal : impacts_) {
+    if (std::none_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; })) continue;
+    double farthest_m = 0.0, fastest_m_s = 0.0;
+    for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) farthest_m = std::max(farthest_m, modal.impact->calc_depth(k));
+    for (const int body : modal.bodies) {
+      farthest_m = std::max(farthest_m, bodies_.get_swing(body));
+      fastest_m_s = std::max(fastest_m_s, bodies_.calc_speed(body));
+    }
+    if (farthest_m < kFarYieldedM) continue;
+    length_s = std::min(length_s, std::max(kMinPartS, kMaxPartM / fastest_m_s));
+  }
+  return length_s;
+}
+
 bool ModalImpacts::may_meet_others(const Step& step, double length_s, TouchSets& touches) {
   for (Pair* pair : step.island().pairs) {
     if (pair->cord >= 0 || pair->b < 0) continue;
@@ -307,6 +335,23 @@ ModalImpacts::End ModalImpacts::find_end(const ModalImpact& modal, double time_s
   return time_s - modal.start_s > (is_slow ? kMaxSlowImpactS : kMaxImpactS) ? End::lasts : End::none;
 }
 
+/// Contacts of an impact at the current poses, for a part of this length. `shapes`: takes the mode shapes that they refer to.
+std::vector<impact::Contact> ModalImpacts::place_springs(const ModalImpact& modal, const std::vector<impact::Body>& bodies, double part_s,
+                                                         std::list<std::vector<double>>& shapes) const {
+  std::vector<impact::Contact> springs;
+  const std::vector<impact::Spring> laws = find_springs(modal, part_s);
+  for (int k = 0; const ModalContact& contact : modal.contacts) {
+    impact::Contact& spring = springs.emplace_back(modal.impact->get_contact(k));
+    spring.spring = laws[k++];
+    spring.where_m = find_station(contact);
+    if (contact.is_followed) spring.normal = contact.normal;
+    if (!contact.shape_a.empty()) spring.shape_a = shapes.emplace_back(turn_to_world(contact.forces.a, contact.shape_a));
+    if (!contact.shape_b.empty()) spring.shape_b = shapes.emplace_back(turn_to_world(contact.forces.b, contact.shape_b));
+    spring.gap_m = contact.is_followed ? std::max(contact.gap_m + calc_yield(spring, bodies), 0.0) : -modal.impact->get_compression(k - 1);
+  }
+  return springs;
+}
+
 void ModalImpacts::advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches) {
   for (ModalImpact& modal : impacts_) {
     const bool is_here = std::any_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; });
@@ -322,12 +367,14 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
       continue;
     }
     std::vector<joints::Spatial> pulls(count);
+    std::vector<Vec3> gyroscopic_n_m(count);
     for (int k = 0; k < count; ++k) {
       const int body = modal.bodies[k], n = step.find(body);
       if (n < 0) continue;
       impact::Body& b = bodies[k];
       set_motion(body, b);
       if (!b.on_joints) b.spin_acceleration_rad_s2 = (1.0 / step.length_s) * (step.free[n].placed.spin - bodies_.placed(body).spin);
+      gyroscopic_n_m[k] = b.inertia_kg_m2 * b.spin_acceleration_rad_s2;
       // Cords and other contacts act as long as the impact lasts in this part; its own steps may be longer.
       const Vec3 free = b.on_joints ? step.free[n].state.velocity : bodies_.state(body).velocity + step.length_s * bodies_.gravity();
       pulls[k] = {(1.0 / step.length_s) * (step.movers[n].velocity - free),
@@ -335,19 +382,8 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
       b.acceleration_m_s2 = b.acceleration_m_s2 + pulls[k].linear;
       b.spin_acceleration_rad_s2 = b.spin_acceleration_rad_s2 + pulls[k].angular;
     }
-    std::vector<impact::Contact> springs;
     std::list<std::vector<double>> shapes;
-    const std::vector<impact::Spring> laws = find_springs(modal, part_s);
-    for (int k = 0; const ModalContact& contact : modal.contacts) {
-      impact::Contact& spring = springs.emplace_back(modal.impact->get_contact(k));
-      spring.spring = laws[k++];
-      spring.where_m = find_station(contact);
-      if (contact.is_followed) spring.normal = contact.normal;
-      if (!contact.shape_a.empty()) spring.shape_a = shapes.emplace_back(turn_to_world(contact.forces.a, contact.shape_a));
-      if (!contact.shape_b.empty()) spring.shape_b = shapes.emplace_back(turn_to_world(contact.forces.b, contact.shape_b));
-      spring.gap_m =
-          contact.is_followed ? std::max(contact.gap_m + calc_yield(spring, bodies), 0.0) : -modal.impact->get_compression(k - 1);
-    }
+    const std::vector<impact::Contact> springs = place_springs(modal, bodies, part_s, shapes);
     modal.impact->update(bodies, springs);
     for (int k = 0; k < count; ++k)
       push(*modal.impact, k, bodies[k], bodies_.state(modal.bodies[k]).velocity, bodies_.placed(modal.bodies[k]).spin);
@@ -366,8 +402,7 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
       s.velocity = bodies[k].velocity_m_s;
       s.centre = s.centre + bodies[k].moved_m;
       s.rotation = normalise(multiply(make_turn(bodies[k].turned_rad), s.rotation));
-      const Mat3 rotation = make_rotation(s.rotation);
-      s.momentum = rotation * (bodies_.solid(body).inertia_kg_m2 * (transpose(rotation) * bodies[k].spin_rad_s));
+      s.momentum = calc_momentum(bodies_.solid(body), s.rotation, bodies[k], gyroscopic_n_m[k]);
     }
     keep_pulses(modal);
     (void)retain(modal);

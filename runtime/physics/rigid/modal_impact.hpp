@@ -71,6 +71,8 @@ class ModalImpacts {
   void follow(const Step& step, double length_s, TouchSets& touches);
   /// Begins impacts of ringing bodies before contact of their deformed surfaces in a step.
   void begin_early(const Step& step, double length_s, const Instants& instants);
+  /// Length of the next part of a step with this rest [s], short where surfaces yield or swing far.
+  double limit_part(const Step& step, double length_s) const;
   /// True if a body moved by an impact may meet a body outside of it within a step.
   bool may_meet_others(const Step& step, double length_s, TouchSets& touches);
   /// Depth of a pair explained by springs and modes of its impact [m].
@@ -111,6 +113,8 @@ class ModalImpacts {
   ModalContact* find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const;
   bool place(ModalContact& contact, bool is_closed, Contact& touch, const geometry::Touch& at);
   std::vector<impact::Spring> find_springs(const ModalImpact& modal, double part_s) const;
+  std::vector<impact::Contact> place_springs(const ModalImpact& modal, const std::vector<impact::Body>& bodies, double part_s,
+                                             std::list<std::vector<double>>& shapes) const;
   static double calc_yield(const impact::Contact& contact, const std::vector<impact::Body>& bodies);
   bool add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const;
   bool shares_articulations(const std::vector<Hit>& hits, const std::vector<int>& order) const;

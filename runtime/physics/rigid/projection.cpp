@@ -61,12 +61,12 @@ void Projection::collect(const Step& step) {
   const auto is_owing = [&](int body) { return owed_j_[body] > 0.0; };
   if (std::none_of(step.island().bodies.begin(), step.island().bodies.end(), is_owing)) return;
   const bool is_held = std::any_of(step.island().pairs.begin(), step.island().pairs.end(), [&](const Pair* pair) {
-    return can_part(step, *pair) && pair->touches() && !(is_movable(pair->a) && is_movable(pair->b));
+    return can_part(step, *pair) && (pair->touches() || pair->is_pressed()) && !(is_movable(pair->a) && is_movable(pair->b));
   });
   if (!is_held) return;  // a free island keeps its momentum
   for (const int i : step.island().bodies) {
     // A slow body that pays goes on creeping: a heap would not come to rest.
-    if (!is_owing(i) || !can_pay(i) || bodies_.calc_speed(i) < kSlowSpeedMS) continue;
+    if (!is_owing(i) || !is_movable(i) || bodies_.calc_speed(i) < kSlowSpeedMS) continue;
     State& s = bodies_.state(i);
     const double kinetic_j = calc_kinetic(bodies_.solid(i), s, bodies_.placed(i)), paid_j = std::min(owed_j_[i], kMaxPaidRatio * kinetic_j);
     if (!(paid_j > 0.0)) continue;

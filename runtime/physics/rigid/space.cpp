@@ -116,6 +116,7 @@ double Space::begin_part(double left_s, double open_m, bool has_struck) {
   modal_impacts_.end_where_touching(step_, touches_);
   extend_in_impacts();
   if (h > kMaxStruckStepS && modal_impacts_.may_meet_others(step_, h, touches_)) h = kMaxStruckStepS;
+  h = modal_impacts_.limit_part(step_, h);
   projection_.collect(step_);
   projection_.run(step_, open_m, h);
   modal_impacts_.follow(step_, h, touches_);

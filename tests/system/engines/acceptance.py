@@ -25,7 +25,7 @@ WANTED = {
     "pile": {"windows_db": 3.0, "end_db": 0.0},
     "bar": {**THROWN, "end_db": 0.0},
     "slap": {**THROWN, "end_db": 0.0},
-    "rod": {**THROWN, "first_db": 1.0, "centroid_percent": 5.0, "quiet_db": 6.0},
+    "rod": {**THROWN, "first_db": 1.0, "centroid_percent": 5.0, "quiet_db": 4.5},
     "row": {"first_db": 3.0, "centroid_percent": 10.0, "windows_db": 3.0},
     "bead": THROWN,
     "flat": {"first_db": 3.0, "centroid_percent": 10.0, "end_db": 0.0},  # then each engine rocks in its own way
