@@ -88,7 +88,7 @@ struct Pair {
     return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });
   }
   /// Closed in a modal impact.
-  bool is_pressed() const {
+  bool presses() const {
     return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.presses && c.touch.gap_m <= 0.0; });
   }
   /// Gap within kDeepM, with or without a force.

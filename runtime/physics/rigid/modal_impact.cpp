@@ -41,16 +41,21 @@ double calc_deepest(const ModalImpact& modal) {
 }
 
 /// Angular momentum of a body after a part of an impact, which turned it with the inertia and the gyroscopic couple of its start: their
-/// work is taken back from the spin.
-Vec3 calc_momentum(const Solid& solid, const Quaternion& turned, const impact::Body& b, const Vec3& gyroscopic_n_m) {
+/// work is taken back from the spin. `pull`: angular acceleration by other forces.
+Vec3 calc_momentum(const Solid& solid, const Quaternion& turned, const impact::Body& b, const Vec3& pull_rad_s2) {
   const Mat3 rotation = make_rotation(turned);
-  const Vec3 momentum = rotation * (solid.inertia_kg_m2 * (transpose(rotation) * b.spin_rad_s));
+  const Vec3 momentum = rotation * (solid.inertia_kg_m2 * (transpose(rotation) * b.spin_rad_s)),
+             gyroscopic_n_m = b.inertia_kg_m2 * (b.spin_acceleration_rad_s2 - pull_rad_s2);
   const double turning_j = 0.5 * dot(b.spin_rad_s, momentum),
                wanted_j = 0.5 * dot(b.spin_rad_s, b.inertia_kg_m2 * b.spin_rad_s) - dot(gyroscopic_n_m, b.turned_rad);
   return turning_j > 0.0 && wanted_j > 0.0 ? std::sqrt(wanted_j / turning_j) * momentum : momentum;
 }
 
 double calc_lost(const impact::Books& books) { return books.dissipated_modes + books.dissipated_contact; }
+
+bool has_bodies_of(const Step& step, const ModalImpact& modal) {
+  return std::any_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; });
+}
 
 bool has_contact(const ModalImpact& modal, const Pair& pair) {
   return std::any_of(modal.contacts.begin(), modal.contacts.end(), [&](const ModalContact& c) { return c.is_between(pair.a, pair.b); });
@@ -270,7 +275,7 @@ void ModalImpacts::part(Pair& pair, const TouchSets& touches) const {
 
 void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches) {
   for (ModalImpact& modal : impacts_) {
-    if (std::none_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; })) continue;
+    if (!has_bodies_of(step, modal)) continue;
     for (ModalContact& contact : modal.contacts) contact.is_followed = false;
     for (int n = 0; const impact::Body& b : modal.impact->get_bodies())
       if (const int body = modal.bodies[n++]; bodies_.has_modes(body)) note_swing(bodies_, body, b.q, b.q_dot);
@@ -294,9 +299,8 @@ void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches)
 
 double ModalImpacts::limit_part(const Step& step, double length_s) const {
   for (const ModalImpact& modal : impacts_) {
-    if (std::none_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; })) continue;
-    double farthest_m = 0.0, fastest_m_s = 0.0;
-    for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) farthest_m = std::max(farthest_m, modal.impact->calc_depth(k));
+    if (!has_bodies_of(step, modal)) continue;
+    double farthest_m = calc_deepest(modal), fastest_m_s = 0.0;
     for (const int body : modal.bodies) {
       farthest_m = std::max(farthest_m, bodies_.get_swing(body));
       fastest_m_s = std::max(fastest_m_s, bodies_.calc_speed(body));
@@ -354,8 +358,7 @@ std::vector<impact::Contact> ModalImpacts::place_springs(const ModalImpact& moda
 
 void ModalImpacts::advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches) {
   for (ModalImpact& modal : impacts_) {
-    const bool is_here = std::any_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; });
-    if (!is_here || !(part_s > 0.0)) continue;
+    if (!has_bodies_of(step, modal) || !(part_s > 0.0)) continue;
     std::vector<impact::Body> bodies = modal.impact->get_bodies();
     const int count = static_cast<int>(bodies.size());
     // A struck sleeping body now moves or belongs to another island: the impact cannot continue unchanged.
@@ -367,14 +370,12 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
       continue;
     }
     std::vector<joints::Spatial> pulls(count);
-    std::vector<Vec3> gyroscopic_n_m(count);
     for (int k = 0; k < count; ++k) {
       const int body = modal.bodies[k], n = step.find(body);
       if (n < 0) continue;
       impact::Body& b = bodies[k];
       set_motion(body, b);
       if (!b.on_joints) b.spin_acceleration_rad_s2 = (1.0 / step.length_s) * (step.free[n].placed.spin - bodies_.placed(body).spin);
-      gyroscopic_n_m[k] = b.inertia_kg_m2 * b.spin_acceleration_rad_s2;
       // Cords and other contacts act as long as the impact lasts in this part; its own steps may be longer.
       const Vec3 free = b.on_joints ? step.free[n].state.velocity : bodies_.state(body).velocity + step.length_s * bodies_.gravity();
       pulls[k] = {(1.0 / step.length_s) * (step.movers[n].velocity - free),
@@ -402,7 +403,7 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
       s.velocity = bodies[k].velocity_m_s;
       s.centre = s.centre + bodies[k].moved_m;
       s.rotation = normalise(multiply(make_turn(bodies[k].turned_rad), s.rotation));
-      s.momentum = calc_momentum(bodies_.solid(body), s.rotation, bodies[k], gyroscopic_n_m[k]);
+      s.momentum = calc_momentum(bodies_.solid(body), s.rotation, bodies[k], pulls[k].angular);
     }
     keep_pulses(modal);
     (void)retain(modal);

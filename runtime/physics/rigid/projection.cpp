@@ -61,7 +61,7 @@ void Projection::collect(const Step& step) {
   const auto is_owing = [&](int body) { return owed_j_[body] > 0.0; };
   if (std::none_of(step.island().bodies.begin(), step.island().bodies.end(), is_owing)) return;
   const bool is_held = std::any_of(step.island().pairs.begin(), step.island().pairs.end(), [&](const Pair* pair) {
-    return can_part(step, *pair) && (pair->touches() || pair->is_pressed()) && !(is_movable(pair->a) && is_movable(pair->b));
+    return can_part(step, *pair) && (pair->touches() || pair->presses()) && !(is_movable(pair->a) && is_movable(pair->b));
   });
   if (!is_held) return;  // a free island keeps its momentum
   for (const int i : step.island().bodies) {

@@ -12,7 +12,7 @@ CHAOTIC = ("box", "tube", "two", "pile", "bar", "slap", "rod", "row", "bead", "d
 # Further starts to each side, and their distance [m]. Single bounces are chaotic: a frequency changed by 1e-9 moves medians of the pile
 # and the rod by 2 dB over 13 starts, by 0.5 dB over 49. The rod's level while it rolls differs by up to 5 dB between starts of our own.
 STARTS = {"tube": (6, 5e-4), "slap": (6, 5e-4), "row": (6, 5e-4), "bead": (6, 5e-4), "rod": (24, 1.25e-4), "pile": (24, 1.25e-4)}
-PLAYED_WHOLE = {"rod": 6}  # every sixth start; of others only the first, and 0.5 s of the rest
+PLAYED_WHOLE = {"rod": 6}  # every sixth start; of other scenes the first only
 
 
 def get_starts(name):
@@ -203,8 +203,9 @@ def count_lost(programs, folder, engine, name, hz):
 
 
 def find_length(name, number):
-    """Seconds to play of a start; 0 is the first."""
-    return SCENES[name][0] if number % PLAYED_WHOLE.get(name, 1000) == 0 else 0.5
+    """Seconds to play of a start; number 0 is the first."""
+    is_whole = number % PLAYED_WHOLE[name] == 0 if name in PLAYED_WHOLE else number == 0
+    return SCENES[name][0] if is_whole else 0.5
 
 
 def move_bodies(bodies, offset_m):
