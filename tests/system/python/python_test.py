@@ -18,6 +18,7 @@ import tempfile
 import threading
 import time
 import unittest
+import unittest.mock
 import warnings
 
 import h5py
@@ -219,13 +220,16 @@ class Jobs(Case):
         self.refuse(carillon.InputError, lambda: carillon.solve({**BAR, "band_hz": [20, float("inf")]}), "finite")
         self.refuse(carillon.InputError, lambda: carillon.solve({**BAR, "note": object()}), "object")
         self.refuse(carillon.InputError, lambda: carillon.solve(BAR, bank="/proc/none/x.hdf"), "/proc/none")
-        path = os.environ["PATH"]
-        os.environ["PATH"] = str(self.folder)
-        try:
+        with unittest.mock.patch.dict(os.environ, PATH=str(self.folder)):
             self.refuse(carillon.SystemError, lambda: carillon.solve(BAR, ranks=2), "mpirun is not in PATH")
-        finally:
-            os.environ["PATH"] = path
-        self.assertFalse([name for name in os.listdir(tempfile.gettempdir()) if name.startswith("carillon-solve-")])
+
+    def test_jobs_leave_no_temporary_files(self):
+        scratch = self.folder / "scratch"
+        scratch.mkdir()
+        with unittest.mock.patch.object(tempfile, "tempdir", str(scratch)):
+            self.refuse(carillon.InputError, lambda: carillon.solve({**BAR, "material": "steele"}), "steel")
+            self.assertGreater(len(carillon.solve(BAR)), 0)
+        self.assertEqual(list(scratch.iterdir()), [])
 
     def test_an_interrupt_ends_the_solver(self):
         script = "import carillon, sys\nprint('begins', flush=True)\ncarillon.solve(%r)\n" % {
