@@ -1,5 +1,7 @@
 // Method: convex polyhedra by clipping; other pairs by one pass in each direction (pass.hpp), then ridges against ridges. Candidates and
 // near samples are cached with a slack: a distance changes by at most the relative movement of the pair.
+#include <algorithm>
+
 #include "runtime/physics/geometry/lowest.hpp"
 #include "runtime/physics/geometry/pass.hpp"
 #include "runtime/physics/geometry/reduce.hpp"
@@ -88,7 +90,7 @@ bool find_lowest_over(const Shape& body, const Frame& pose, const Shape& other, 
 
 Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double gap, PairMemory& memory) {
   Deepest found{.gap_m = gap};
-  const double far = a.get_radius_m() + b.get_radius_m();
+  const double far = a.get_radius_m() + b.get_radius_m() + std::max(gap, 0.0);
   if (norm2(to_world(fa, a.get_middle_m()) - to_world(fb, b.get_middle_m())) > far * far || (a.is_polyhedron() && b.is_polyhedron()))
     return found;
   const Frame relative = calc_relative(fa, fb);
@@ -99,7 +101,7 @@ Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Fram
   }
   std::vector<Touch> none;
   NearSamples& near = memory.near;
-  update_near(a, fa, b, fb, std::max(a.get_sag_m(), b.get_sag_m()), near);
+  update_near(a, fa, b, fb, std::max({a.get_sag_m(), b.get_sag_m(), gap}), near);
   near.gone_m += calc_way(near.last, relative, a);
   near.last = relative;
   for (const bool is_of_a : {true, false}) {

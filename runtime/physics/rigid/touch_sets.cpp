@@ -340,6 +340,15 @@ void TouchSets::add(Pair& pair, const geometry::Touch& touch) {
   pair.contacts.push_back(added);
 }
 
+bool TouchSets::may_meet(Pair& pair, double step_s) const {
+  if (!pair.contacts.empty()) return true;
+  if (pair.cord >= 0) return false;
+  // A search may miss curved surfaces that turn towards each other.
+  return geometry::find_deepest(*bodies_.get_shape(pair.a), bodies_.get_frame(pair.a), *bodies_.get_shape(pair.b),
+                                bodies_.get_frame(pair.b), calc_way(pair, step_s, step_s), pair.memory)
+             .place >= 0;
+}
+
 void TouchSets::forget_closing(const Step& step) const {
   for (Pair* pair : step.island().pairs)
     for (Contact& c : pair->contacts) c.closes_s = -1.0;

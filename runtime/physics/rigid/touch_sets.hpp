@@ -45,6 +45,8 @@ class TouchSets {
   void remove_false(Pair& pair) const;
   /// Updates touches for a step: searched again if the pair may have moved by its margin.
   void update(Pair& pair, double step_s);
+  /// True if the bodies of a pair may meet within a step: they have contacts, or come nearer than they move.
+  bool may_meet(Pair& pair, double step_s) const;
   /// Resets the closing times of the contacts of a step.
   void forget_closing(const Step& step) const;
   /// Touches at the end of a step.

@@ -298,8 +298,9 @@ int Windows::find_stride(const Pair& pair) const {
 std::vector<Island> Windows::make_islands(const std::list<ModalImpact>& impacts) {
   const int count = bodies_.count();
   base::Groups groups(count);
-  for (const Pair* pair : near_)
-    if (!pair->contacts.empty() && bodies_.moves(pair->a) && bodies_.moves(pair->b) && is_due(pair->a) && is_due(pair->b))
+  for (Pair* pair : near_)
+    if (bodies_.moves(pair->a) && bodies_.moves(pair->b) && is_due(pair->a) && is_due(pair->b) &&
+        touches_.may_meet(*pair, calc_length(std::max(strides_[pair->a], strides_[pair->b]))))
       groups.join(pair->a, pair->b);
   for (const ModalImpact& impact : impacts) {
     int first = -1;

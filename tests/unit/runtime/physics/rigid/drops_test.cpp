@@ -195,6 +195,59 @@ TEST(drops, depth_of_boxes_that_meet_in_flight) {
   EXPECT_GT(struck, 450);
 }
 
+/// Two curved bodies that turn and fly towards each other. Largest depth after any step, as a share of the allowed one.
+double run_meeting(unsigned seed, bool& has_struck) {
+  std::mt19937 random(seed);
+  const auto draw = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  const auto draw_direction = [&] {
+    std::normal_distribution<double> normal;
+    const Vec3 x{normal(random), normal(random), normal(random)};
+    return (1.0 / norm(x)) * x;
+  };
+  static constexpr std::array kCurved{0, 1, 2, 3, 4, 5, 6};
+  std::vector<Solid> solids;
+  std::vector<State> states;
+  for (int k : {0, 1}) {
+    const DropBody body = make_drop_body(kCurved.at(random() % kCurved.size()), 1);
+    State& at = states.emplace_back();
+    const Vec3 axis = draw_direction();
+    const double half = draw(0.0, std::numbers::pi);
+    at.rotation = {std::cos(half), std::sin(half) * axis[0], std::sin(half) * axis[1], std::sin(half) * axis[2]};
+    const Mat3 rotation = make_rotation(at.rotation);
+    at.momentum = rotation * (body.solid.inertia_kg_m2 * (transpose(rotation) * (draw(0.0, 150.0) * draw_direction())));
+    solids.push_back(body.solid);
+    if (k == 0) continue;
+    const Vec3 from = draw_direction();
+    at.centre = (solids[0].radius_m + body.solid.radius_m + 1e-3) * from + draw(0.0, 0.01) * draw_direction();
+    at.velocity = -draw(0.5, 6.0) * from;
+  }
+  const double ends_s = 2.0 * norm(states[1].centre) / norm(states[1].velocity);
+  Space space(std::move(solids), std::move(states), std::nullopt, {}, {});
+  const geometry::Shape &a = *space.solid(0).shape, &b = *space.solid(1).shape;
+  double deepest_m = 0.0;
+  while (space.get_time() < ends_s - 1e-9) {
+    space.step(ends_s);
+    geometry::PairMemory memory;
+    deepest_m = std::max(deepest_m, -geometry::find_deepest(a, space.get_frame(0), b, space.get_frame(1), 0.0, memory).gap_m);
+  }
+  has_struck = !space.take_strikes().empty();
+  return deepest_m / calc_allowed_depth({.thickness_m = std::min(a.get_thickness_m(), b.get_thickness_m())});
+}
+
+// Of 3,000 such pairs 34 were up to 12 times deeper than allowed before bodies whose search had found no touch were compared at the end of
+// a step; five are now, 1.4 times at most. The seeds of twelve of them, and others.
+TEST(drops, depth_of_curved_bodies_that_meet_in_flight) {
+  std::vector<unsigned> seeds{1157, 1224, 1329, 1559, 1574, 1727, 1764, 1795, 1880, 1891, 2001, 2003};
+  for (unsigned seed = 1; seed <= 20; ++seed) seeds.push_back(seed);
+  int struck = 0;
+  for (const unsigned seed : seeds) {
+    bool has_struck = false;
+    EXPECT_LE(run_meeting(seed, has_struck), 1.0) << seed;
+    struck += has_struck ? 1 : 0;
+  }
+  EXPECT_GT(struck, 28);
+}
+
 // A cup and a bowl in a bowl that is fixed. Oracle: they fall no higher than they were, so that nothing lifts them. With touches that a
 // search had lost, and with displacements before each proof of rest, they were lifted by 0.4 % of their energy and rattled on.
 TEST(drops, no_lift_of_cup_or_bowl_in_bowl) {
