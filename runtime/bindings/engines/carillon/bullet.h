@@ -2,6 +2,8 @@
 #ifndef CARILLON_BULLET_H
 #define CARILLON_BULLET_H
 
+#include <BulletDynamics/Featherstone/btMultiBody.h>
+#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 #include <btBulletDynamicsCommon.h>
 #include <carillon.h>
 
@@ -21,8 +23,8 @@ class BulletTouches {
   /// Both must outlive this object.
   BulletTouches(btDynamicsWorld& world, carillon_touches* touches) : world_(world), touches_(touches) {}
 
-  /// `index` of carillon_touches_add, one after another from 0. Objects that are not added are the ground. `mesh`: rotation of the frame of
-  /// the bank's mesh in the frame of the object, whose origin must be the centre of mass.
+  /// A btRigidBody or btMultiBodyLinkCollider. `index` of carillon_touches_add, one after another from 0. Objects that are not added are the
+  /// ground. `mesh`: rotation of the frame of the bank's mesh in the frame of the object, whose origin must be the centre of mass.
   void add(const btCollisionObject& object, std::int32_t index, const btQuaternion& mesh = btQuaternion::getIdentity()) {
     if (bodies_.size() <= static_cast<std::size_t>(index)) bodies_.resize(static_cast<std::size_t>(index) + 1);
     bodies_[static_cast<std::size_t>(index)] = {&object, mesh, 0u};
@@ -84,12 +86,25 @@ class BulletTouches {
       copy(at.getOrigin(), pose.position_m);
       pose.flags = std::exchange(bodies_[i].flags, 0u);
       if (!object->isActive() && !object->isStaticObject()) pose.flags |= CARILLON_ASLEEP;
+      if (const btMultiBodyLinkCollider* link = btMultiBodyLinkCollider::upcast(object)) read_link(*link, pose);
       const btRigidBody* body = btRigidBody::upcast(object);
       if (body == nullptr) continue;
       copy(body->getLinearVelocity(), pose.velocity_m_s);
       copy(body->getAngularVelocity(), pose.spin_rad_s);
       if (body->getNumConstraintRefs() > 0) pose.flags |= CARILLON_JOINTED;
     }
+  }
+  /// Velocities of a link, or of the base, of a btMultiBody.
+  void read_link(const btMultiBodyLinkCollider& link, carillon_pose& pose) {
+    const btMultiBody& whole = *link.m_multiBody;
+    const std::size_t count = static_cast<std::size_t>(whole.getNumLinks()) + 1, at = static_cast<std::size_t>(link.m_link + 1);
+    spins_.resize(count);
+    velocities_.resize(count);
+    whole.compTreeLinkVelocities(spins_.data(), velocities_.data());  // each in the frame of its link; the base first
+    const btQuaternion turn = link.getWorldTransform().getRotation();
+    copy(quatRotate(turn, velocities_[at]), pose.velocity_m_s);
+    copy(quatRotate(turn, spins_[at]), pose.spin_rad_s);
+    if (count > 1) pose.flags |= CARILLON_JOINTED;
   }
   void read_points() {
     points_.clear();
@@ -127,6 +142,7 @@ class BulletTouches {
   std::map<const btCollisionObject*, std::int32_t> indices_;
   std::vector<carillon_pose> poses_;
   std::vector<carillon_point> points_;
+  std::vector<btVector3> spins_, velocities_;  // of the links of a btMultiBody
 };
 
 }  // namespace carillon
