@@ -1,4 +1,5 @@
-// Method:     sixteen facets in the lanes. For each midpoint of the patch and each of the three of a lane's facet: G = e^{ikr} / r and
+// Method:     sixteen facets in the lanes, kWidth at a time. For each midpoint of the patch and each of the three of a lane's facet: G =
+// e^{ikr} / r and
 //             g = (1/r - ik) G / r, combined to the kernels of - K - alpha W and - V - alpha K'; then sums over the midpoints next to a
 //             node, and over its facets for the curls. Points that are near each other take part without the static kernels, by series.
 // Source:     docs/equations.md E10. Sine and cosine: reduction by pi / 2 in three parts, polynomials of degree 7 and 8 (least squares).
@@ -10,8 +11,10 @@ HWY_BEFORE_NAMESPACE();
 namespace carillon::air::HWY_NAMESPACE {
 namespace {
 
-typedef float F __attribute__((vector_size(64)));
-typedef std::int32_t I __attribute__((vector_size(64)));
+constexpr int kWidth = CARILLON_REGISTER_BYTES / sizeof(float);
+
+typedef float F __attribute__((vector_size(4 * kWidth)));
+typedef std::int32_t I __attribute__((vector_size(4 * kWidth)));
 
 inline F load(const float* at) { return *reinterpret_cast<const F*>(at); }
 inline void store(float* at, F value) { *reinterpret_cast<F*>(at) = value; }
@@ -19,7 +22,7 @@ inline F all(float value) { return value - F{}; }
 
 inline F calc_root(F x) {
   F root;
-  for (int lane = 0; lane < kLanes; ++lane) root[lane] = __builtin_sqrtf(x[lane]);
+  for (int lane = 0; lane < kWidth; ++lane) root[lane] = __builtin_sqrtf(x[lane]);
   return root;
 }
 
@@ -79,9 +82,9 @@ struct PointRow {
 };
 
 template <bool kMayBeNear>
-inline void calc_point(const TestBlock& block, const PatchPoint& point, const WaveNumber& wave, PointRow& row) {
-  const F weight = load(block.weight);
-  const F nx = load(block.normal[0]), ny = load(block.normal[1]), nz = load(block.normal[2]);
+inline void calc_point(const TestBlock& block, int lane, const PatchPoint& point, const WaveNumber& wave, PointRow& row) {
+  const F weight = load(block.weight + lane);
+  const F nx = load(block.normal[0] + lane), ny = load(block.normal[1] + lane), nz = load(block.normal[2] + lane);
   const float k = wave.k, beta = wave.coupling;
   // - alpha k^2 (n_x . n_y) G, alpha = i beta: i G = - im + i re
   const F normals = (-beta * k * k) * (nx * point.normal[0] + ny * point.normal[1] + nz * point.normal[2]);
@@ -89,10 +92,10 @@ inline void calc_point(const TestBlock& block, const PatchPoint& point, const Wa
   F re[3], im[3], right_re[3], right_im[3];
 #pragma GCC unroll 3
   for (int s = 0; s < 3; ++s) {
-    const F dx = load(block.place[s][0]) - point.place[0], dy = load(block.place[s][1]) - point.place[1],
-            dz = load(block.place[s][2]) - point.place[2];
+    const F dx = load(block.place[s][0] + lane) - point.place[0], dy = load(block.place[s][1] + lane) - point.place[1],
+            dz = load(block.place[s][2] + lane) - point.place[2];
     const F squared = dx * dx + dy * dy + dz * dz;
-    F reach = load(block.reach[s]);
+    F reach = load(block.reach[s] + lane);
     if constexpr (kMayBeNear) reach = select(reach < point.reach, all(point.reach), reach);
     const Kernel kernel = calc_kernel<kMayBeNear>(squared, reach, k);
     const F to_patch = dx * point.normal[0] + dy * point.normal[1] + dz * point.normal[2];
@@ -116,14 +119,14 @@ inline void calc_point(const TestBlock& block, const PatchPoint& point, const Wa
 }
 
 template <bool kMayBeNear>
-inline void calc_points(const TestBlock& block, const Patch& patch, const WaveNumber& wave, float* points, float* right) {
+inline void calc_points(const TestBlock& block, int lane, const Patch& patch, const WaveNumber& wave, float* points, float* right) {
   constexpr int kTogether = 16;  // midpoints whose rows stay in the first cache while the sources pass over them
-  alignas(64) float rows[kTogether][6][kLanes];
+  alignas(64) float rows[kTogether][6][kWidth];
   for (int first = 0; first < patch.points; first += kTogether) {
     const int count = patch.points - first < kTogether ? patch.points - first : kTogether;
     for (int p = 0; p < count; ++p) {
       PointRow row;
-      calc_point<kMayBeNear>(block, patch.point[first + p], wave, row);
+      calc_point<kMayBeNear>(block, lane, patch.point[first + p], wave, row);
       float* at = points + (first + p) * 8 * kLanes;
 #pragma GCC unroll 3
       for (int c = 0; c < 3; ++c) {
@@ -159,11 +162,13 @@ inline void calc_points(const TestBlock& block, const Patch& patch, const WaveNu
   }
 }
 
-void calc_tile(const TestBlock& block, const Patch& patch, const WaveNumber& wave, const TileRoom& room, float* matrix, float* right) {
+/// calc_tile() of kWidth lanes from `lane` on; the buffers begin there, too.
+inline void calc_lanes(const TestBlock& block, int lane, const Patch& patch, const WaveNumber& wave, const TileRoom& room, float* matrix,
+                       float* right) {
   if (patch.may_be_near) {
-    calc_points<true>(block, patch, wave, room.point, right);
+    calc_points<true>(block, lane, patch, wave, room.point, right);
   } else {
-    calc_points<false>(block, patch, wave, room.point, right);
+    calc_points<false>(block, lane, patch, wave, room.point, right);
   }
   for (int t = 0; t < patch.facets; ++t) {
     const std::int32_t* p = patch.facet_points + 3 * t;
@@ -193,12 +198,17 @@ void calc_tile(const TestBlock& block, const Patch& patch, const WaveNumber& wav
     // + alpha curl . curl G, alpha = i beta
 #pragma GCC unroll 3
     for (int c = 0; c < 3; ++c) {
-      const F cx = load(block.curl[c][0]), cy = load(block.curl[c][1]), cz = load(block.curl[c][2]);
+      const F cx = load(block.curl[c][0] + lane), cy = load(block.curl[c][1] + lane), cz = load(block.curl[c][2] + lane);
       float* out = matrix + (j * 6 + 2 * c) * kLanes;
       store(out, sum[2 * c] - beta * (cx * im[0] + cy * im[1] + cz * im[2]));
       store(out + kLanes, sum[2 * c + 1] + beta * (cx * re[0] + cy * re[1] + cz * re[2]));
     }
   }
+}
+
+void calc_tile(const TestBlock& block, const Patch& patch, const WaveNumber& wave, const TileRoom& room, float* matrix, float* right) {
+  for (int lane = 0; lane < kLanes; lane += kWidth)
+    calc_lanes(block, lane, patch, wave, {room.point + lane, room.facet + lane}, matrix + lane, right + lane);
 }
 
 inline F load_unaligned(const float* at) {
@@ -217,15 +227,15 @@ inline void multiply_some(const float* matrix, std::size_t unknowns, std::size_t
   for (int r = 0; r < kRows; ++r)
 #pragma GCC unroll 2
     for (int v = 0; v < kVectors; ++v) {
-      re[r][v] = load_unaligned(y + r * 2 * stride + v * kLanes);
-      im[r][v] = load_unaligned(y + (r * 2 + 1) * stride + v * kLanes);
+      re[r][v] = load_unaligned(y + r * 2 * stride + v * kWidth);
+      im[r][v] = load_unaligned(y + (r * 2 + 1) * stride + v * kWidth);
     }
   for (std::size_t j = first; j < last; ++j) {
     F a[kVectors], b[kVectors];
 #pragma GCC unroll 2
     for (int v = 0; v < kVectors; ++v) {
-      a[v] = load_unaligned(x + j * 2 * stride + v * kLanes);
-      b[v] = load_unaligned(x + (j * 2 + 1) * stride + v * kLanes);
+      a[v] = load_unaligned(x + j * 2 * stride + v * kWidth);
+      b[v] = load_unaligned(x + (j * 2 + 1) * stride + v * kWidth);
     }
 #pragma GCC unroll 4
     for (int r = 0; r < kRows; ++r) {
@@ -243,8 +253,8 @@ inline void multiply_some(const float* matrix, std::size_t unknowns, std::size_t
   for (int r = 0; r < kRows; ++r)
 #pragma GCC unroll 2
     for (int v = 0; v < kVectors; ++v) {
-      store_unaligned(y + r * 2 * stride + v * kLanes, re[r][v]);
-      store_unaligned(y + (r * 2 + 1) * stride + v * kLanes, im[r][v]);
+      store_unaligned(y + r * 2 * stride + v * kWidth, re[r][v]);
+      store_unaligned(y + (r * 2 + 1) * stride + v * kWidth, im[r][v]);
     }
 }
 
@@ -263,13 +273,14 @@ inline void multiply_vectors(const float* matrix, std::size_t rows, std::size_t 
 }
 
 void multiply_rows(const float* matrix, std::size_t rows, std::size_t unknowns, const float* x, std::size_t vectors, float* y) {
+  constexpr int kVectors = kWidth == kLanes ? 2 : 1;  // sums that fit into the registers
   const std::size_t stride = vectors * kLanes;
   for (std::size_t i = 0; i < rows * 2 * stride; ++i) y[i] = 0.0F;
-  for (std::size_t v = 0; v < vectors; v += 2) {
-    if (v + 2 <= vectors) {
-      multiply_vectors<2>(matrix, rows, unknowns, x + v * kLanes, stride, y + v * kLanes);
+  for (std::size_t at = 0; at < stride; at += kVectors * kWidth) {
+    if (at + kVectors * kWidth <= stride) {
+      multiply_vectors<kVectors>(matrix, rows, unknowns, x + at, stride, y + at);
     } else {
-      multiply_vectors<1>(matrix, rows, unknowns, x + v * kLanes, stride, y + v * kLanes);
+      multiply_vectors<1>(matrix, rows, unknowns, x + at, stride, y + at);
     }
   }
 }

@@ -11,10 +11,11 @@ HWY_BEFORE_NAMESPACE();
 namespace carillon::ldlt::HWY_NAMESPACE {
 namespace {
 
-typedef double Vector __attribute__((vector_size(64)));
+constexpr int kWidth = CARILLON_REGISTER_BYTES / sizeof(double);
+typedef double Vector __attribute__((vector_size(8 * kWidth)));
 /// Rows and vectors of a product that the registers hold.
-constexpr int kRows = HWY_MAX_BYTES >= 64 ? 12 : HWY_MAX_BYTES == 32 ? 6 : 3;
-constexpr int kVectors = HWY_MAX_BYTES >= 64 ? 2 : 1;
+constexpr int kRows = kWidth == 8 ? 12 : 6;
+constexpr int kVectors = 2;
 
 inline double magnitude(double x) { return __builtin_fabs(x); }
 
@@ -180,8 +181,8 @@ inline Quad find_larger(Quad a, Quad b) {
   return size > a ? size : a;
 }
 
-typedef double UnalignedVector __attribute__((vector_size(64), aligned(8)));
-constexpr int kLanes = kWideRows / 8;
+typedef double UnalignedVector __attribute__((vector_size(8 * kWidth), aligned(8)));
+constexpr int kLanes = kWideRows / kWidth;  // vectors in a row of a strip
 
 inline Vector load_vector(const double* from) { return *reinterpret_cast<const UnalignedVector*>(from); }
 inline void store_vector(double* to, Vector value) { *reinterpret_cast<UnalignedVector*>(to) = value; }
@@ -228,14 +229,15 @@ inline void update_block(const double* tile, const Vector* strip, int n, bool is
 #pragma GCC unroll 12
         for (int i = 0; i < kCount; ++i)
 #pragma GCC unroll 2
-          for (int u = 0; u < kVectors; ++u) __builtin_prefetch(columns[kBegin + i] + row + 8 * (v + u), 1);
+          for (int u = 0; u < kVectors; ++u) __builtin_prefetch(columns[kBegin + i] + row + kWidth * (v + u), 1);
       Vector sum[kCount][kVectors] = {};
       add_outer<kHeight, true>(tile + kBegin, strip + v, n, sum);
 #pragma GCC unroll 12
       for (int i = 0; i < kCount; ++i) {
-        double* target = columns[kBegin + i] + row + 8 * v;
+        double* target = columns[kBegin + i] + row + kWidth * v;
 #pragma GCC unroll 2
-        for (int u = 0; u < kVectors; ++u) store_vector(target + 8 * u, is_set ? sum[i][u] : load_vector(target + 8 * u) + sum[i][u]);
+        for (int u = 0; u < kVectors; ++u)
+          store_vector(target + kWidth * u, is_set ? sum[i][u] : load_vector(target + kWidth * u) + sum[i][u]);
       }
     }
     update_block<kHeight, kBegin + kCount>(tile, strip, n, is_set, columns, row);
@@ -248,7 +250,7 @@ void trsm(const double* const* columns, int begin, int end, int n, const double*
     auto* strip = reinterpret_cast<Vector*>(wide);
     if (row + kWideRows <= end) {
       for (int k = 0; k < n; ++k)
-        for (int v = 0; v < kLanes; ++v) strip[k * kLanes + v] = load_vector(columns[k] + row + 8 * v);
+        for (int v = 0; v < kLanes; ++v) strip[k * kLanes + v] = load_vector(columns[k] + row + kWidth * v);
     } else {
       for (int k = 0; k < n; ++k)
         for (int r = 0; r < kWideRows; ++r) wide[k * kWideRows + r] = row + r < end ? columns[k][row + r] : 0;

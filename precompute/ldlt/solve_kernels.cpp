@@ -10,10 +10,12 @@ HWY_BEFORE_NAMESPACE();
 namespace carillon::ldlt::HWY_NAMESPACE {
 namespace {
 
-typedef double Vector __attribute__((vector_size(64)));
+constexpr int kWidth = CARILLON_REGISTER_BYTES / sizeof(double);
+typedef double Vector __attribute__((vector_size(8 * kWidth)));
 /// Rows and vectors of a product that the registers hold.
-constexpr int kRows = HWY_MAX_BYTES >= 64 ? 12 : HWY_MAX_BYTES == 32 ? 6 : 3;
-constexpr int kVectors = HWY_MAX_BYTES >= 64 ? 2 : 1;
+constexpr int kRows = kWidth == 8 ? 12 : 6;
+constexpr int kVectors = 2;
+constexpr int kOne = 8 / kWidth, kTwo = 2 * kOne;  // kStride, vectors in a row, of one and of two vectors of right-hand sides
 
 /// Numbers of L to prefetch, from memory to the second-level cache and then to the first: the order of use inside a tile is
 /// not what the processor predicts.
@@ -54,8 +56,8 @@ inline TileRows<kStride> find_rows(double* all, const int* nodes, int count) {
   for (int a = 0; a < kTileRows / 3; ++a)
     rows.node[a] = reinterpret_cast<Vector*>(all) + 3 * kStride * static_cast<long>(nodes[a < count ? a : 0]);
   for (int a = kTileRows / 3; a < 2 * (kTileRows / 3) && a < count; ++a) {
-    const double* next = all + 24 * kStride * static_cast<long>(nodes[a]);
-    for (int line = 0; line < 3 * kStride; ++line) __builtin_prefetch(next + kLine * line, 1);
+    const double* next = all + 3 * kStride * kWidth * static_cast<long>(nodes[a]);
+    for (int line = 0; line < 3 * kStride * kWidth / kLine; ++line) __builtin_prefetch(next + kLine * line, 1);
   }
   return rows;
 }
@@ -193,16 +195,17 @@ void add_trmm_transposed(const double* tiles, int n, double* in_rows, double* ou
 }
 
 void subtract_product(const double* tiles, int m, int n, int vectors, const double* in, const int* nodes, double* rows) {
-  vectors == 1 ? subtract_product<1>(tiles, m, n, in, nodes, rows) : subtract_product<2>(tiles, m, n, in, nodes, rows);
+  vectors == 1 ? subtract_product<kOne>(tiles, m, n, in, nodes, rows) : subtract_product<kTwo>(tiles, m, n, in, nodes, rows);
 }
 void subtract_transposed(const double* tiles, int m, int n, int vectors, const int* nodes, double* rows, double* out, const double* next) {
-  vectors == 1 ? subtract_transposed<1>(tiles, m, n, nodes, rows, out, next) : subtract_transposed<2>(tiles, m, n, nodes, rows, out, next);
+  vectors == 1 ? subtract_transposed<kOne>(tiles, m, n, nodes, rows, out, next)
+               : subtract_transposed<kTwo>(tiles, m, n, nodes, rows, out, next);
 }
 void trmm(const double* tiles, int n, int vectors, const double* in, double* out) {
-  vectors == 1 ? trmm<1>(tiles, n, in, out) : trmm<2>(tiles, n, in, out);
+  vectors == 1 ? trmm<kOne>(tiles, n, in, out) : trmm<kTwo>(tiles, n, in, out);
 }
 void add_trmm_transposed(const double* tiles, int n, int vectors, double* in, double* out, const double* next) {
-  vectors == 1 ? add_trmm_transposed<1>(tiles, n, in, out, next) : add_trmm_transposed<2>(tiles, n, in, out, next);
+  vectors == 1 ? add_trmm_transposed<kOne>(tiles, n, in, out, next) : add_trmm_transposed<kTwo>(tiles, n, in, out, next);
 }
 
 template <int kStride>
@@ -220,7 +223,7 @@ void multiply_by_d_inverse(const double* diagonal, const double* off, int n, con
 }
 
 void multiply_by_d_inverse(const double* diagonal, const double* off, int n, int vectors, const double* in, double* out) {
-  vectors == 1 ? multiply_by_d_inverse<1>(diagonal, off, n, in, out) : multiply_by_d_inverse<2>(diagonal, off, n, in, out);
+  vectors == 1 ? multiply_by_d_inverse<kOne>(diagonal, off, n, in, out) : multiply_by_d_inverse<kTwo>(diagonal, off, n, in, out);
 }
 
 typedef double Quad __attribute__((vector_size(32)));

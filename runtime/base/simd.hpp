@@ -28,6 +28,9 @@
 
 #include "runtime/base/instructions.hpp"
 
+/// Width of GCC's vector types in such loops: that of a register of the set. GCC 12 keeps wider ones in memory, at a tenth of the speed.
+#define CARILLON_REGISTER_BYTES (HWY_MAX_BYTES < 16 ? 16 : HWY_MAX_BYTES)
+
 namespace carillon::base {
 
 /// The function of HWY_DISPATCH_TABLE(function) for a set, or the best one below it that is supported. [audio-thread]

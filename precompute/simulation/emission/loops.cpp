@@ -7,8 +7,7 @@ HWY_BEFORE_NAMESPACE();
 namespace carillon::emission::HWY_NAMESPACE {
 namespace {
 
-// Vectors of register width: wider ones spill to memory.
-constexpr std::size_t kWidth = HWY_MAX_BYTES < 16 ? 2 : HWY_MAX_BYTES / sizeof(double);
+constexpr std::size_t kWidth = CARILLON_REGISTER_BYTES / sizeof(double);
 constexpr std::size_t kQuad = kWidth < 4 ? kWidth : 4;
 typedef double Wide __attribute__((vector_size(8 * kWidth), aligned(8), may_alias));
 typedef double Quad __attribute__((vector_size(8 * kQuad), aligned(8), may_alias));

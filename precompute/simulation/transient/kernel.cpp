@@ -13,7 +13,7 @@ HWY_BEFORE_NAMESPACE();
 namespace carillon::transient::HWY_NAMESPACE {
 namespace {
 
-constexpr int kLanes = HWY_MAX_BYTES < 16 ? 2 : HWY_MAX_BYTES / sizeof(double);
+constexpr int kLanes = CARILLON_REGISTER_BYTES / sizeof(double);
 typedef double V __attribute__((vector_size(8 * kLanes)));
 typedef double Pair __attribute__((vector_size(16)));
 typedef double Four __attribute__((vector_size(32)));
