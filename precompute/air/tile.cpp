@@ -1,5 +1,4 @@
-// Method:     sixteen facets in the lanes, kWidth at a time. For each midpoint of the patch and each of the three of a lane's facet: G =
-// e^{ikr} / r and
+// Method:     facets in the lanes of registers. For each midpoint of the patch and each of the three of a lane's facet: G = e^{ikr} / r and
 //             g = (1/r - ik) G / r, combined to the kernels of - K - alpha W and - V - alpha K'; then sums over the midpoints next to a
 //             node, and over its facets for the curls. Points that are near each other take part without the static kernels, by series.
 // Source:     docs/equations.md E10. Sine and cosine: reduction by pi / 2 in three parts, polynomials of degree 7 and 8 (least squares).

@@ -8,11 +8,11 @@ namespace {
 
 using la::NodeMatrix;
 using Row = NodeMatrix::Row;
-// Loops over the sums are unrolled: GCC 12 keeps them in memory otherwise.
 constexpr int kWidth = CARILLON_REGISTER_BYTES / sizeof(double);
 typedef double Vector __attribute__((vector_size(8 * kWidth), may_alias));
 constexpr int kVectors = NodeMatrix::kStrip / kWidth;
 
+// Loops over the sums are unrolled: GCC 12 spills them to memory otherwise.
 void add_sums(std::size_t rows, const Row* phi_rows, const Row* m_rows, const Row* k_rows, const double* diagonal, const Row& lambda,
               Sums& sums) {
   const auto* phi = reinterpret_cast<const Vector*>(phi_rows);

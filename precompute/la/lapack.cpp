@@ -75,8 +75,11 @@ int calc_eigenpairs_by_division(Matrix& a, Vector& values) {
   values.resize(n);
   std::vector<double> work(work_size);
   std::vector<int> integers(integers_size);
+  Matrix kept = a;
   dsyevd_("V", "L", &n, a.data(), &n, values.data(), work.data(), &work_size, integers.data(), &integers_size, &info);
-  return info;
+  if (info <= 0) return info;
+  a.swap(kept);
+  return calc_eigenpairs(a, values);
 }
 
 int calc_generalised_eigenpairs(Matrix& a, Matrix& b, Vector& values) {
@@ -97,8 +100,12 @@ int calc_generalised_eigenpairs_by_division(Matrix& a, Matrix& b, Vector& values
   const int work_size = static_cast<int>(best_size);
   std::vector<double> work(work_size);
   std::vector<int> integers(integers_size);
+  Matrix kept_a = a, kept_b = b;
   dsygvd_(&type, "V", "L", &n, a.data(), &n, b.data(), &n, values.data(), work.data(), &work_size, integers.data(), &integers_size, &info);
-  return info;
+  if (info <= 0) return info;
+  a.swap(kept_a);
+  b.swap(kept_b);
+  return calc_generalised_eigenpairs(a, b, values);
 }
 
 }  // namespace carillon::la

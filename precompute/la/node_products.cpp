@@ -9,11 +9,10 @@ namespace {
 constexpr int kStrip = NodeMatrix::kStrip;
 using Row = NodeMatrix::Row;
 
-// All loops over the sums are unrolled: GCC 12 keeps them in memory otherwise.
 constexpr int kWidth = CARILLON_REGISTER_BYTES / sizeof(double);
 typedef double Vector __attribute__((vector_size(8 * kWidth), may_alias));
 constexpr int kVectors = kStrip / kWidth;
-constexpr int kTogether = 2;  // vectors of a row whose sums, and their own rows, the registers hold
+constexpr int kTogether = 2;  // vectors of a row at a time: the registers hold three sums of each
 static_assert(kVectors % kTogether == 0);
 
 [[gnu::always_inline]] inline void prefetch_rows(const Row* rows) {
@@ -21,7 +20,9 @@ static_assert(kVectors % kTogether == 0);
   for (int line = 0; line < 3 * kStrip / 8; ++line) __builtin_prefetch(reinterpret_cast<const double*>(rows) + 8 * line);
 }
 
-/// The vectors of all rows from `first` on, kTogether of them.
+// All loops over the sums are unrolled: GCC 12 spills them to memory otherwise.
+
+/// kTogether vectors of each row of a node, from vector `first` on.
 [[gnu::always_inline]] inline void multiply_node(std::int64_t begin, std::int64_t end, const std::int32_t* neighbour, const double* values,
                                                  const double* rest, const Vector* own_row, const Row* x, int first, Vector* out) {
   Vector sum[3][kTogether], own[3][kTogether];

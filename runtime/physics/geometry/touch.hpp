@@ -85,7 +85,7 @@ Deepest find_lowest(const Shape& a, const Frame& frame, double height_m);
 bool may_tip(const Shape& a, const Frame& frame, const Vec3& normal, const Vec3& spin, std::span<const Vec3> touches, double far_m,
              double time_s);
 /// None (-1) between two polyhedra, whose searches find all touches, and if no sample and, over a facet of a polyhedron, no lowest vertex
-/// is deeper than `gap_m`.
+/// is deeper than `gap_m`, or nearer than it if it is positive.
 Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m, PairMemory& memory);
 /// Touch of such a vertex, at these or other frames.
 Touch make_ground_touch(const Shape& a, const Frame& frame, double height_m, int vertex);
