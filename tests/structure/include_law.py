@@ -21,7 +21,7 @@ LIBRARIES = {
     "mysofa": ["mysofa.h"],
     "cairo": ["cairo"],
     "portaudio": ["portaudio.h"],
-    "bullet": ["btBulletDynamicsCommon.h"],
+    "bullet": ["btBulletDynamicsCommon.h", "BulletDynamics/"],
     "mujoco": ["mujoco/"],
     "carillon": ["carillon.h"],
     "metis": ["metis.h"],

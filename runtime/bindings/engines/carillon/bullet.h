@@ -23,8 +23,8 @@ class BulletTouches {
   /// Both must outlive this object.
   BulletTouches(btDynamicsWorld& world, carillon_touches* touches) : world_(world), touches_(touches) {}
 
-  /// A btRigidBody or btMultiBodyLinkCollider. `index` of carillon_touches_add, one after another from 0. Objects that are not added are the
-  /// ground. `mesh`: rotation of the frame of the bank's mesh in the frame of the object, whose origin must be the centre of mass.
+  /// A btRigidBody or btMultiBodyLinkCollider. `index` of carillon_touches_add, one after another from 0. Objects that are not added are
+  /// the ground. `mesh`: rotation of the frame of the bank's mesh in the frame of the object, whose origin must be the centre of mass.
   void add(const btCollisionObject& object, std::int32_t index, const btQuaternion& mesh = btQuaternion::getIdentity()) {
     if (bodies_.size() <= static_cast<std::size_t>(index)) bodies_.resize(static_cast<std::size_t>(index) + 1);
     bodies_[static_cast<std::size_t>(index)] = {&object, mesh, 0u};
