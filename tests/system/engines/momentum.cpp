@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "tests/system/engines/engine.hpp"
+#include "tests/system/engines/tracker.hpp"
 
 namespace {
 
@@ -17,7 +18,6 @@ constexpr double kRadius = 0.03;
 constexpr int kBalls = 2;  // the first bodies
 
 struct Seen {
-  std::vector<carillon_pose> before, now;
   std::vector<double> sums_n_s;  // x y z of each body
   double off_m = 0.0;            // of points from the surfaces of balls
   double normal = 0.0;           // largest deviation of a normal from a unit vector
@@ -26,10 +26,12 @@ struct Seen {
 };
 Seen seen;
 
-void take(const carillon_point& p) {
+}  // namespace
+
+void carillon::testing::take(const carillon_point& p) {
   ++seen.points;
   if (std::isnan(p.friction_n_s[0])) seen.has_friction = false;
-  const std::vector<carillon_pose>& poses = seen.points_after ? seen.now : seen.before;
+  const std::vector<carillon_pose>& poses = seen.points_after ? now : before;
   double length2 = 0.0;
   for (int k = 0; k < 3; ++k) {
     const double push = p.impulse_n_s * p.normal[k] + (seen.has_friction ? p.friction_n_s[k] : 0.0);
@@ -48,6 +50,8 @@ void take(const carillon_point& p) {
     seen.off_m = std::max(seen.off_m, std::abs(std::sqrt(distance2) - kRadius));
   }
 }
+
+namespace {
 
 Solid make_solid(const char* name, const char* kind, const std::array<double, 3>& half_m, double mass_kg,
                  const std::array<double, 3>& at_m) {
@@ -81,22 +85,6 @@ std::vector<Solid> make_solids() {
 
 }  // namespace
 
-// In place of the library.
-extern "C" {
-carillon_status carillon_touches_start(carillon_touches*, double, const carillon_pose* poses, int32_t bodies, char*, size_t) {
-  seen.now.assign(poses, poses + bodies);
-  seen.sums_n_s.assign(static_cast<std::size_t>(3 * bodies), 0.0);
-  return CARILLON_OK;
-}
-carillon_status carillon_touches_step(carillon_touches*, double, const carillon_pose* poses, int32_t bodies, const carillon_point* points,
-                                      int32_t count, char*, size_t) {
-  seen.before = seen.now;
-  seen.now.assign(poses, poses + bodies);
-  for (int32_t i = 0; i < count; ++i) take(points[i]);
-  return CARILLON_OK;
-}
-}
-
 int main(int argc, char** argv) {
   if (argc != 3) return std::fputs("usage: momentum_NAME LARGEST_SHARE LARGEST_OFFSET_M\n", stderr), 2;
   try {
@@ -107,15 +95,16 @@ int main(int argc, char** argv) {
     carillon::testing::set_options(options);
     seen.points_after = options.points_after != 0;
     const auto engine = carillon::testing::make_engine(solids, kStep, nullptr);
+    seen.sums_n_s.assign(3 * solids.size(), 0.0);
     engine->start(nullptr, 0);
-    const std::vector<carillon_pose> begin = seen.now;
+    const std::vector<carillon_pose> begin = carillon::testing::now, &now = carillon::testing::now;
     constexpr int kSteps = 240;
     for (int n = 1; n <= kSteps; ++n) engine->step(n * kStep, nullptr, 0);
     double worst = 0.0;
     for (std::size_t i = 0; i < solids.size(); ++i) {
       const double weight_n_s = solids[i].mass_kg * 9.81 * kSteps * kStep;
       for (int k = 0; k < 3; ++k) {
-        const double gained = solids[i].mass_kg * (seen.now[i].velocity_m_s[k] - begin[i].velocity_m_s[k]);
+        const double gained = solids[i].mass_kg * (now[i].velocity_m_s[k] - begin[i].velocity_m_s[k]);
         const double given = seen.sums_n_s[3 * i + static_cast<std::size_t>(k)] - (k == 2 ? weight_n_s : 0.0);
         std::printf("body %zu, axis %d: momentum %.6f N s, impulses %.6f N s\n", i, k, gained, given);
         // Sums of springs: a stiff tube is in contact for a few internal steps only, and off by 3 %.

@@ -3,17 +3,15 @@
 
 usage: instructions.py BIN_DIR
 """
-import json
 import os
 import pathlib
-import subprocess
-import sys
 import tempfile
 
 import h5py
 import numpy as np
 
-BIN = pathlib.Path(sys.argv[1]).resolve()
+import solver
+
 SETS = {"plain": "", "sse4": "sse4_1", "avx2": "avx2", "avx512": "avx512dq"}  # flag of /proc/cpuinfo
 BODY = {"shape": "bowl", "outer_radius_m": 0.05, "wall_m": 0.005, "opening_angle_deg": 120}
 # Largest relative difference. Kernels of the air and of the error bars have single precision.
@@ -28,11 +26,9 @@ ALLOWED = {
 
 def solve(folder, job, instructions):
     """The datasets of ALLOWED in the bank."""
-    (folder / "job.json").write_text(json.dumps({**job, "material": "steel", "bank": "bank.hdf"}))
-    environment = {**os.environ, "CARILLON_INSTRUCTIONS": instructions}
-    done = subprocess.run([BIN / "carillon-precompute", "-q", "job.json"], cwd=folder, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    with h5py.File(folder / "bank.hdf") as bank:
+    solver.write_job(folder, **job, material="steel")
+    solver.run(folder, "carillon-precompute", "-q", "job.json", env={**os.environ, "CARILLON_INSTRUCTIONS": instructions})
+    with h5py.File(folder / "job.hdf") as bank:
         return {key: bank[key][:] for key in ALLOWED if key in bank}
 
 
