@@ -431,16 +431,17 @@ TEST(Synthesiser, SensorsAreAddedAndReadDuringPlayback) {
   std::atomic<bool> stops{false};
   std::array<std::atomic<int>, 40> kept{};  // numbers of the sensors whose bodies stay
   std::atomic<int> kept_count{0};
+  std::atomic<std::size_t> read{0};
   std::thread audio([&] {
     std::vector<float> left(64), right(64);
     const std::array<float*, 2> out{left.data(), right.data()};
-    for (int i = 0; i < 1500; ++i) {
+    // Until the other threads have had their turns, however they are scheduled.
+    while (kept_count < static_cast<int>(kept.size()) || read <= 1000) {
       synthesiser.process(out.data(), 2, 64);
       std::this_thread::yield();
     }
     stops = true;
   });
-  std::size_t read = 0;
   std::thread reader([&] {
     std::vector<double> samples(4096);
     while (!stops) {
