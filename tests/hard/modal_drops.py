@@ -98,6 +98,27 @@ REPEATED = {
         {"restitution": 0.343638, "friction": 0.427706},
         [1.5455, 0, -9.68749],
     ),
+    # Followed every 2 % of its size its contact left the disc 0.14 mm deeper than explained.
+    "topple": (
+        "disc",
+        "rubber",
+        start_at([0, 0, 0.044413], [0.855773, 0.517272, -0.00906861, 0], [0.092228, 0, 0], [1.50633, 0, 0.57672]),
+        {"restitution": 0.498762, "friction": 0.510496},
+        [0, 0, -9.81],
+    ),
+    # An impact that began early was not followed for the rest of the step: 0.14 mm.
+    "rim": (
+        "bowl",
+        "rubber",
+        start_at(
+            [0.05317295442489718, 0.000507981709969629, 0.17861550610169025],
+            [0.7266128401359853, -0.09174073048190791, 0.6746858952807663, -0.0917407304819079],
+            [0, 0, 0],
+            [11.196689726500317, 0, -6.971953345769214],
+        ),
+        {"restitution": 0.8872973021898688, "friction": 0.2284799879478797},
+        [1.2323004488175888, 0, -9.732293440081015],
+    ),
     # Moved apart within its impacts the pen gained 16 % of its largest kinetic energy.
     "roll": (
         "pen",

@@ -347,8 +347,9 @@ bool ModalImpacts::may_begin_early(const Step& step, const Pair& pair, const Ins
   return is_free(pair.a) && is_free(pair.b);
 }
 
-void ModalImpacts::begin_early(const Step& step, double length_s, const Instants& instants) {
-  if (!may_begin_) return;
+bool ModalImpacts::begin_early(const Step& step, double length_s, const Instants& instants) {
+  if (!may_begin_) return false;
+  bool has_begun = false;
   for (Pair* pair : step.island().pairs) {
     if (!may_begin_early(step, *pair, instants)) continue;
     std::vector<Contact*> early;
@@ -365,12 +366,14 @@ void ModalImpacts::begin_early(const Step& step, double length_s, const Instants
       hits.push_back({.a = c.a, .b = c.b, .touch = c.touch, .triangles = c.triangles});
     }
     if (early.empty()) continue;
+    has_begun = true;
     ModalImpact& modal = impacts_.emplace_back();
     modal.start_s = fly_to_modes(hits, order);
     Made made;
     for (int n = 0; Contact * c : early) add_contact(modal, *c, pair->sag_m, hits[n++], false, made);
     modal.impact = std::make_unique<impact::Impact>(std::move(made.bodies), std::move(made.springs));
   }
+  return has_begun;
 }
 
 bool ModalImpacts::begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches) {

@@ -15,7 +15,9 @@ constexpr double kMaxSlowImpactS = 50e-3;     // s; end of slow impacts, which b
 constexpr double kMaxImpactS = 0.5;           // s; and of all others
 constexpr double kMaxCorrectionRatio = 0.01;  // fraction of the kinetic energy: maximum correction per step of an impact on joints
 constexpr double kSamePlaceRatio = 0.05;      // of the size
-constexpr double kMinMoveRatio = 0.02;        // fraction of the size: minimum distance of a contact from its touch for an update
+constexpr double kMinMoveRatio = 0.02;        // fraction of the size: minimum distance of a contact from its touch for an update,
+constexpr double kYieldedM = 1e-4;            // m; where it yields more,
+constexpr double kMinYieldedRatio = 0.005;    // a smaller one: its modes yield differently a short way off
 constexpr int kMaxFollowed = 12;              // contacts per impact, including open ones
 constexpr double kExplainedRatio = 1.3;       // permitted ratio of the depth to that of spring and modes
 constexpr int kMaxRolled = 8;                 // slow pulses in a row, each at another place: the impact has become rolling
@@ -174,7 +176,7 @@ void ModalImpacts::end_where_touching(const Step& step, TouchSets& touches) {
 }
 
 /// Moves a contact to its touch; true if a pulse ends because the touch is at another place.
-bool ModalImpacts::place(ModalContact& contact, bool is_closed, Contact& touch, const geometry::Touch& at) {
+bool ModalImpacts::place(ModalContact& contact, const Pressed& pressed, Contact& touch, const geometry::Touch& at) {
   Forces& forces = contact.forces;
   const bool is_swapped = forces.a != touch.a;
   contact.touch = touch.touch.id;
@@ -184,11 +186,12 @@ bool ModalImpacts::place(ModalContact& contact, bool is_closed, Contact& touch, 
   contact.gap_m = at.gap_m;
   touch.press();
   const Vec3 station = find_station(touch.a, touch.b, at);
-  if (norm(contact.station - station) < kMinMoveRatio * bodies_.calc_size(touch.a, touch.b)) return false;
-  const bool has_pulse = forces.continues || !forces.on_a.empty();
+  const double moved_ratio = norm(contact.station - station) / bodies_.calc_size(touch.a, touch.b);
+  if (moved_ratio < (pressed.depth_m > kYieldedM ? kMinYieldedRatio : kMinMoveRatio)) return false;
+  const bool has_pulse = moved_ratio >= kMinMoveRatio && (forces.continues || !forces.on_a.empty());
   report(contact);
   forces.continues = false;
-  forces.moves = is_closed;
+  forces.moves = pressed.is_closed;
   Hit hit{.a = touch.a, .b = touch.b, .touch = at, .triangles = touch.triangles};
   contact.station = station;
   for (const bool is_a : {true, false}) {
@@ -234,7 +237,8 @@ void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double way_m, double l
   const double reach_m = 2.0 * way_m + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kMaxDepthM;
   const auto follow_touch = [&](ModalContact& contact, Contact& c) {
     const int k = static_cast<int>(&contact - modal.contacts.data());
-    if (!place(contact, modal.impact->get_compression(k) > 0.0, c, touches.find_closing(pair, c, length_s))) return;
+    const Pressed pressed{modal.impact->get_compression(k) > 0.0, modal.impact->calc_depth(k)};
+    if (!place(contact, pressed, c, touches.find_closing(pair, c, length_s))) return;
     modal.rolled = std::abs(modal.impact->calc_approach(k)) < kRattleSpeedMS ? modal.rolled + 1 : 0;
   };
   std::vector<Contact*> others;
@@ -255,7 +259,7 @@ void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double way_m, double l
       Hit hit{.a = c->a, .b = c->b, .touch = touches.find_closing(pair, *c, length_s), .triangles = c->triangles};
       Made made;
       add_contact(modal, *c, pair.sag_m, hit, false, made);
-      place(modal.contacts.back(), false, *c, hit.touch);
+      place(modal.contacts.back(), {}, *c, hit.touch);
     }
   }
 }

@@ -69,8 +69,8 @@ class ModalImpacts {
   void end_where_touching(const Step& step, TouchSets& touches);
   /// Moves contacts of impacts to their touches; touches that may close within a step become open contacts.
   void follow(const Step& step, double length_s, TouchSets& touches);
-  /// Begins impacts of ringing bodies before contact of their deformed surfaces in a step.
-  void begin_early(const Step& step, double length_s, const Instants& instants);
+  /// Begins impacts of ringing bodies before contact of their deformed surfaces in a step; true if there were any.
+  bool begin_early(const Step& step, double length_s, const Instants& instants);
   /// Length of the next part of a step with this rest [s], short where surfaces yield or swing far.
   double limit_part(const Step& step, double length_s) const;
   /// True if a body moved by an impact may meet a body outside of it within a step.
@@ -101,6 +101,12 @@ class ModalImpacts {
     std::list<std::vector<double>> shapes;  // of the contacts
   };
 
+  /// State of a contact that is followed.
+  struct Pressed {
+    bool is_closed = false;
+    double depth_m = 0.0;  // by its spring and modes
+  };
+
   /// True if contacts of a body can belong to an impact, as it does itself or has neither motion nor modes.
   bool may_join(bool is_in, int body) const { return is_in || (!bodies_.moves(body) && !bodies_.has_modes(body)); }
   ModalImpact* find(int body);
@@ -111,7 +117,7 @@ class ModalImpacts {
   void follow(ModalImpact& modal, Pair& pair, double way_m, double length_s, TouchSets& touches);
   void part(Pair& pair, const TouchSets& touches) const;
   ModalContact* find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const;
-  bool place(ModalContact& contact, bool is_closed, Contact& touch, const geometry::Touch& at);
+  bool place(ModalContact& contact, const Pressed& pressed, Contact& touch, const geometry::Touch& at);
   std::vector<impact::Spring> find_springs(const ModalImpact& modal, double part_s) const;
   std::vector<impact::Contact> place_springs(const ModalImpact& modal, const std::vector<impact::Body>& bodies, double part_s,
                                              std::list<std::vector<double>>& shapes) const;

@@ -101,18 +101,21 @@ void Space::open_window(double end_s) {
 
 /// Depth from which the bodies of an island are moved apart [m].
 double Space::calc_open_depth(const Island& island) const {
-  const bool is_on_ground =
-      island.bodies.size() == 1 && std::all_of(island.pairs.begin(), island.pairs.end(), [](const Pair* pair) { return pair->b < 0; });
-  if (is_on_ground) return kDeepM;
+  const bool is_alone = island.bodies.size() == 1 && std::none_of(island.pairs.begin(), island.pairs.end(), [&](const Pair* pair) {
+                          return pair->b >= 0 && bodies_.moves(pair->a) && bodies_.moves(pair->b);
+                        });
+  if (is_alone) return kDeepM;
   const bool wobbles = std::any_of(island.bodies.begin(), island.bodies.end(),
                                    [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlowSpeedMS; });
   return wobbles ? kMaxDepthM - kMissingDepthM : kMaxDepthM;
 }
 
-/// Prepares the impacts with modes and the touches of a part of a step, at most `left_s` long; returns its length.
-double Space::begin_part(double left_s, double open_m, bool has_struck) {
-  double h = has_struck && !modal_impacts_.list().empty() ? std::min(left_s, kMaxStruckStepS) : left_s;
-  modal_impacts_.begin_early(step_, h, instants_);
+/// Prepares the impacts with modes and the touches of a part of a step, at most `left_s` long; returns its length. `has_struck`: in this
+/// step.
+double Space::begin_part(double left_s, double open_m, bool& has_struck) {
+  const auto limit = [&] { return has_struck && !modal_impacts_.list().empty() ? std::min(left_s, kMaxStruckStepS) : left_s; };
+  has_struck = modal_impacts_.begin_early(step_, limit(), instants_) || has_struck;
+  double h = limit();
   modal_impacts_.end_where_touching(step_, touches_);
   extend_in_impacts();
   if (h > kMaxStruckStepS && modal_impacts_.may_meet_others(step_, h, touches_)) h = kMaxStruckStepS;
@@ -128,7 +131,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   step_.begin(island);
   double done = 0.0;
   int impacts = 0, missed = 0, more = 0;
-  bool begun = false;
+  bool begun = false, has_struck = false;
   const double open_m = calc_open_depth(island);
   const int max_impacts = std::clamp(kMaxStruckBodies / step_.count(), kMinImpacts, kMaxImpacts);
   if (instants_.is_crowded(island, start_s)) {
@@ -138,7 +141,8 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   while (length_s - done > kMinStepS) {
     bodies_.set_time(start_s + done);
     const bool begins = !std::exchange(begun, true), may_sleep = begins && rest_.may_sleep(island.bodies, length_s - done);
-    double h = begin_part(length_s - done, open_m, impacts > 0);
+    has_struck = has_struck || impacts > 0;
+    double h = begin_part(length_s - done, open_m, has_struck);
     if ((may_sleep && try_rest(island, h)) || (begins && rest_.try_still(island, h))) break;
     touches_.forget_closing(step_);
     double depth_m = 0.0;     // at the end of the step

@@ -111,7 +111,7 @@ class Space {
  private:
   void open_window(double end_s);
   double calc_open_depth(const Island& island) const;
-  double begin_part(double left_s, double open_m, bool has_struck);
+  double begin_part(double left_s, double open_m, bool& has_struck);
   void step_island(Island& island, double start_s, double length_s);
   bool try_rest(Island& island, double length_s);
   bool strike_at_once(double start_s, double length_s);
