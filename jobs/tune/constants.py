@@ -127,9 +127,13 @@ class Fit:
 
 
 def find_sizes(job):
-    """{key: m} of the lengths of a body whose shape follows from them."""
+    """{key: value} of the lengths and angles of a body whose shape follows from them."""
     body = job.get("body", {})
-    return {key: value for key, value in body.items() if key.endswith("_m") and key != "edge_m" and isinstance(value, (int, float))}
+    return {
+        key: value
+        for key, value in body.items()
+        if key.endswith(("_m", "_deg")) and key != "edge_m" and isinstance(value, (int, float)) and value > 0
+    }
 
 
 class Matcher:
@@ -155,7 +159,7 @@ class Matcher:
         self.prior = numpy.array([constant.x for constant in self.constants])
         self.prior_sd = numpy.array([constant.prior_sd for constant in self.constants])
         self.sizes = find_sizes(self.job)
-        tolerance = [(tolerance_m or 0.0) / size for size in self.sizes.values()]
+        tolerance = [(tolerance_m or 0.0) / size if key.endswith("_m") else 0.0 for key, size in self.sizes.items()]
         self.size_sd = numpy.array(tolerance)
 
     def hear(self, peaks):

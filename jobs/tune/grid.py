@@ -38,6 +38,14 @@ def tidy(nodes, tets):
     _, first, same = numpy.unique(numpy.round(nodes / size * 1e9).astype(numpy.int64), axis=0, return_index=True, return_inverse=True)
     tets = first[same.ravel()][tets]
     tets = tets[[len(set(tet[:4])) == 4 for tet in tets]]
+    # Edges that have become one have one node: the nearest to their middle.
+    ends = numpy.sort(tets[:, numpy.array(EDGES)], axis=2).reshape(-1, 2)
+    middles = tets[:, 4:].reshape(-1)
+    away = numpy.linalg.norm(nodes[middles] - nodes[ends].mean(axis=1), axis=1)
+    _, edge = numpy.unique(ends, axis=0, return_inverse=True)
+    order = numpy.lexsort((middles, numpy.round(away / size * 1e9), edge.ravel()))
+    _, begin = numpy.unique(edge.ravel()[order], return_index=True)
+    tets[:, 4:] = middles[order[begin]][edge.ravel()].reshape(-1, 6)
     inverted = numpy.linalg.det(nodes[tets[:, 1:4]] - nodes[tets[:, :1]]) < 0
     tets[inverted] = tets[inverted][:, (0, 2, 1, 3, 6, 5, 4, 7, 9, 8)]
     used, tets = numpy.unique(tets, return_inverse=True)

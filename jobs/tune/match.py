@@ -19,6 +19,8 @@ import sound
 from errors import InputError
 from quantities import LENGTH_UNITS, MASS_UNITS, read_quantity
 
+FILES = ("material.json", "peaks.csv", "spectrum.svg")
+T60_RANGE_S = (1e-4, 1e4)
 COLUMNS = {"hz": True, "sd_hz": False, "t60_s": False, "sd_t60_s": False}  # is it required
 
 
@@ -48,7 +50,10 @@ def add_command(commands):
 def read_peaks(path):
     """[Peak] of a CSV file, ascending. InputError with the line."""
     remedy = "give a table whose first row is hz,sd_hz,t60_s,sd_t60_s (hz alone is enough)"
-    rows = list(csv.reader(job_file.read_text(path, "table of peaks", remedy).splitlines()))
+    try:
+        rows = list(csv.reader(job_file.read_text(path, "table of peaks", remedy).splitlines()))
+    except csv.Error as error:
+        raise InputError(f"{path}: cannot be read as a table: {error}; {remedy}") from None
     head = [name.strip().lower() for name in rows[0]] if rows else []
     if "hz" not in head:
         raise InputError(f"{path}:1: has no column hz; {remedy}")
@@ -68,6 +73,8 @@ def read_peaks(path):
         if not 1 <= values.get("hz", 0) <= 1e6:
             raise InputError(f"{path}:{number}: hz is missing or beyond 1 to 1e6; {remedy}")
         hz, t60_s = values["hz"], values.get("t60_s")
+        if t60_s and not T60_RANGE_S[0] <= t60_s <= T60_RANGE_S[1]:
+            raise InputError(f"{path}:{number}: t60_s is {t60_s:g}; give {T60_RANGE_S[0]:g} to {T60_RANGE_S[1]:g} s, or leave it empty")
         decay = sound.T60_DECAY / t60_s if t60_s else None
         sd_decay = decay * values["sd_t60_s"] / t60_s if t60_s and "sd_t60_s" in values else math.inf
         peaks.append(sound.Peak(hz, values.get("sd_hz", 0.0), decay, sd_decay))
@@ -110,7 +117,7 @@ class Match:
         self.hearing = sound.hear(*sound.read_wav(options.sound)) if is_sound else None
         self.peaks = self.hearing.peaks if is_sound else read_peaks(options.sound)
         self.notes = list(self.hearing.notes) if is_sound else []
-        job = job_file.read_job(options.job)
+        job = solver.read_job(options.job)
         made = solver.Solver(programs.find_program(options.bin), options.job, options.timeout)
         self.matcher = constants.Matcher(made, job, self.peaks, options.tolerance)
         self.fit, self.model, rivals = self.matcher.fit()
@@ -313,8 +320,8 @@ def make_spectrum(hearing, low, high, columns=1500):
 
 def run(options):
     """Matches, writes the files, and returns (text, JSON object)."""
-    with results.make_folder(options.out) as out:
+    with results.make_folder(options.out, FILES) as out:
         made = Match(options)
         made.write(out)
-    files = [str(out / name) for name in ("material.json", "peaks.csv", "spectrum.svg")]
+    files = [str(out / name) for name in FILES]
     return made.describe() + "\n" + "\n".join(files), made.to_json() | {"files": files}

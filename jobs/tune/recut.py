@@ -92,11 +92,12 @@ def read_job(path, folder, binaries):
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}; give a job or a bank") from None
     if not is_bank:
-        return job_file.read_job(path), path
+        return solver.read_job(path), path
     with solver.open_bank(pathlib.Path(path), programs.find_program(binaries, "carillon-bank")) as bank:
         job = json.loads(bank["provenance"][()].rstrip(b"\0")) if "provenance" in bank else {}
-    while "of" in job:  # a packed or edited bank
-        job = job["of"]
+    job, edits = solver.find_origin(job)
+    if edits:
+        raise InputError(f"{path}: was edited since its body was computed; give a job of the body as it is now")
     if "body" not in job and "mesh" not in job:
         raise InputError(f"{path}: says no body or mesh that it was computed from; give its job")
     base = pathlib.Path(path).resolve().parent
@@ -119,7 +120,7 @@ def read_job(path, folder, binaries):
 def run(options):
     """(text, document) of carillon tune --cuts."""
     cuts = read_cuts(options.cuts)
-    with results.make_folder(options.out) as out, tempfile.TemporaryDirectory(prefix="carillon-tune-") as name:
+    with results.make_folder(options.out, results.FILES) as out, tempfile.TemporaryDirectory(prefix="carillon-tune-") as name:
         folder = pathlib.Path(name)
         job, file = read_job(options.job, folder, options.bin)
         run = solver.Solver(programs.find_program(options.bin), file)

@@ -1,6 +1,7 @@
 """Output folders, and the files of a design of carillon tune."""
 import contextlib
 import json
+import os
 import pathlib
 import shutil
 
@@ -11,17 +12,31 @@ import grid
 from errors import InputError
 
 MESH = "body.msh"
+FILES = ("job.json", MESH, "bank.hdf", "bank.hdf.resolved.json", "body.stl", "body.obj", "cut.stl", "profile.csv", "drawing.svg")
+FILES += ("table.txt", "tune.json")
+
+
+def check_outputs(paths):
+    """InputError where a file cannot be written."""
+    for path in paths:
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; give another name with -o")
+        if not path.parent.is_dir():
+            raise InputError(f"{path}: there is no folder {path.parent}; make it, or give another name with -o")
+        if not os.access(path if path.exists() else path.parent, os.W_OK):
+            raise InputError(f"{path}: cannot be written: permission denied; give another name with -o")
 
 
 @contextlib.contextmanager
-def make_folder(name):
-    """The path of an output folder, made before the work; without it again where that fails. InputError."""
+def make_folder(name, files):
+    """The path of an output folder for these files, made before the work; without it again where that fails. InputError."""
     path = pathlib.Path(name)
     is_new = not path.exists()
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{path}: cannot create folder: {error.strerror}; give another one with -o") from None
+    check_outputs(path / file for file in files)
     try:
         yield path
     except BaseException:

@@ -11,6 +11,7 @@ import numpy
 import scipy.spatial
 
 import programs
+import results
 import skin
 import solver
 from errors import InputError
@@ -76,11 +77,10 @@ class Map:
             bars[: len(group["by_parameter"])] = group.get("own_error_cents", bars)[: len(group["by_parameter"])]
             self.bar_cents = numpy.where(numpy.isfinite(bars), bars, numpy.inf)
             self.poisson_ratio = float(bank["material/poisson_ratio"][()])
-            job = json.loads(bank["provenance"][()].rstrip(b"\0"))
-        while "of" in job:  # a packed or edited bank
-            job = job["of"]
+            job, edits = solver.find_origin(json.loads(bank["provenance"][()].rstrip(b"\0")))
         body = job.get("body", {})
-        self.thickness_m = body.get("wall_m", body.get("thickness_m"))
+        thickness_m = body.get("wall_m", body.get("thickness_m"))
+        self.thickness_m = thickness_m and thickness_m * math.prod(edit.get("size_scale", 1.0) for edit in edits)
         self.place = self.skin.place
         self.count = len(self.by_parameter)
         self.freq_hz = numpy.array([float(row["heard_frequency_hz"]) for row in rows])[: self.count]
@@ -242,6 +242,7 @@ def run(arguments):
     wrong = [path for path in arguments.output if path.suffix.lower() not in (".csv", ".png", ".glb")]
     if wrong:
         raise InputError(f"{wrong[0]}: the output ends in {wrong[0].suffix or 'nothing'}; give a .csv, .png or .glb file")
+    results.check_outputs(arguments.output)
     if arguments.radius and arguments.at is None:
         raise InputError("--radius is of a spot; give its centre with --at X,Y,Z")
     found = Map(arguments.bank, programs.find_program(arguments.bin, "carillon-bank"))

@@ -5,6 +5,7 @@ comparable vertex by vertex, and the derivatives follow from the sensitivities o
 (docs/equations.md, E7a).
 """
 import dataclasses
+import math
 import pathlib
 import re
 
@@ -169,11 +170,13 @@ def read_mesh(job, job_file, folder, mesher):
     base = pathlib.Path(job_file).resolve().parent
     if "mesh" in job:
         mesh = mesh_file.MeshFile(base / job["mesh"])
+        mesh.nodes = (job.get("mesh_scale", 1.0) * numpy.array(mesh.nodes)).tolist()
     else:
         body = dict(job.get("body", {}))
         words = [str(base / body.pop("surface"))] if "surface" in body else []
         for key, value in body.items():
-            words += [f"--{re.sub('_(m|deg)$', '', key).replace('_', '-')}", str(value)]
+            word = f"--{re.sub('_(m|deg)$', '', key).replace('_', '-')}"
+            words += [word] if value is True else [] if value is False else [word, str(value)]
         path = pathlib.Path(folder) / "start.msh"
         measuring.run_part([mesher, *words, "--order", "2", "-q", "-o", path], folder, job_file)
         mesh = mesh_file.MeshFile(path)
@@ -318,7 +321,9 @@ def read_limits(text, job):
             raise InputError(f"--free {word!r}: give a key and its limits, like body.wall_m=0.002:0.004") from None
         if isinstance(at, bool) or not isinstance(at, (int, float)) or not name.endswith(("_m", "_deg")):
             raise InputError(f"--free {name}: the job has no such size of a body, like body.wall_m")
-        if not 0 < low <= at <= high or low == high:
+        if name in limits:
+            raise InputError(f"--free {name}: is given twice")
+        if not 0 < low <= at <= high < math.inf or low == high:
             raise InputError(f"--free {word}: the value of the job, {at:g}, is not within the limits, above 0")
         limits[name] = (low, high)
     return limits
@@ -340,7 +345,9 @@ def read_outline(path):
 def make_lathe(job, rows, fineness, knots=8, side="inside", wall_m=None):
     """A body of revolution about z from an outline (n, 3), turned on one side: depths at knots along the outline, cubic B-splines."""
     along = numpy.concatenate([[0], numpy.cumsum(numpy.linalg.norm(numpy.diff(rows[:, :2], axis=0), axis=1))])
-    curve = scipy.interpolate.CubicSpline(along, rows[:, :2])
+    # Level at the axis: otherwise the wall would have a hole or an overlap there.
+    ends = [(1, [way, 0.0]) if r == 0 else "not-a-knot" for r, way in ((rows[0, 0], 1.0), (rows[-1, 0], -1.0))]
+    curve = scipy.interpolate.CubicSpline(along, rows[:, :2], bc_type=tuple(ends))
     thickness = scipy.interpolate.PchipInterpolator(along, rows[:, 2])
     length = along[-1]
     around = 2 * numpy.pi * rows[:, 0].max()
@@ -355,13 +362,18 @@ def make_lathe(job, rows, fineness, knots=8, side="inside", wall_m=None):
     turn = 2 * numpy.pi * places[:, 0]
     wall = thickness(s)
     flat = curve(s) + normal * (wall * (places[:, 2] - 0.5))[:, None]
-    flat[:, 0] = numpy.maximum(flat[:, 0], 0)
+    flat[flat[:, 0] < 1e-9 * length, 0] = 0
 
     def revolve(r_z):
         return numpy.stack([r_z[..., 0] * numpy.cos(turn), r_z[..., 0] * numpy.sin(turn), r_z[..., 1]], axis=-1)
 
     nodes = revolve(flat)
     used, tets = grid.tidy(nodes, tets)
+    nodes = nodes[used]
+    # The narrow wedges around the axis have straight edges: curved ones would fold them.
+    ends, middles = tets[:, numpy.array(grid.EDGES)], tets[:, 4:]
+    reaches = (flat[used, 0] <= 0)[ends].sum(axis=2) == 1
+    nodes[middles[reaches]] = nodes[ends[reaches]].mean(axis=1)
     spacing = length / max(knots - 1, 1)
     at = numpy.arange(knots) * spacing
     bases = find_splines(knots, spacing, s)
@@ -386,4 +398,4 @@ def make_lathe(job, rows, fineness, knots=8, side="inside", wall_m=None):
         return "r_mm,z_mm,thickness_mm", 1e3 * numpy.column_stack([middle, thickness(x) - cut])
 
     low, step = numpy.zeros(knots), MAX_SHARE * high
-    return Moved(job, nodes[used], tets, fields, names, low, high, step, marks, smooth=True, profile=calc_profile)
+    return Moved(job, nodes, tets, fields, names, low, high, step, marks, smooth=True, profile=calc_profile)

@@ -14,11 +14,26 @@ import numpy
 import scipy.optimize
 import scipy.spatial
 
+import job_file
 import measuring
 from errors import InputError, RunError
 
 # What decides the frequencies; the air, large motion, queue and files of a job do not.
-KEYS = ("mesh", "mesh_scale", "shape", "body", "accuracy_cents", "material", "band_hz", "max_modes", "element", "mass", "fixed", "solver")
+KEYS = (
+    "mesh",
+    "mesh_scale",
+    "shape",
+    "body",
+    "accuracy_cents",
+    "material",
+    "materials",
+    "band_hz",
+    "max_modes",
+    "element",
+    "mass",
+    "fixed",
+    "solver",
+)
 BAR_SHARES = {0: 1 / 2, 1: 1 / 4}  # of the mesh's bar, by modes/correction: docs/bank-format.md
 MAX_VERTICES = 2000  # sampled to compare shapes
 
@@ -70,6 +85,8 @@ class Solver:
             else {key: job[key] for key in KEYS if key in job} | {"shapes": "exact", "bank": "bank.hdf"}
         )
         if sensitivities:
+            if job.get("materials"):
+                raise InputError(f"{self.job_file}: has several materials; tune a body of one")
             job["sensitivities"] = sensitivities
         base = self.job_file.resolve().parent
         if "mesh" in job:
@@ -102,6 +119,26 @@ class Solver:
         """Their Solutions, as many at once as there are cores."""
         with concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
             return list(pool.map(self.solve, jobs))
+
+
+def read_job(path):
+    """The object of a job, the short form of a shape as a body. InputError."""
+    job = job_file.read_job(path)
+    short = job.get("shape")
+    if isinstance(short, dict) and len(short) == 1 and "body" not in job:
+        [(name, sizes)] = short.items()
+        job = {key: value for key, value in job.items() if key != "shape"} | {"body": {"shape": name} | dict(sizes)}
+    return job
+
+
+def find_origin(provenance):
+    """(job, [edits]): the job that a packed or edited bank was computed from, and its edits since."""
+    edits = []
+    while "of" in provenance:
+        if "edits" in provenance:
+            edits.append(provenance["edits"])
+        provenance = provenance["of"]
+    return provenance, edits
 
 
 def run_program(words, is_text=True):

@@ -6,6 +6,7 @@ In a room, decays are fitted once more, with the room's sound as noise of known 
 """
 import dataclasses
 import math
+import struct
 import warnings
 
 import numpy
@@ -20,13 +21,14 @@ WINDOWS_S = (0.08, 0.3, 1.2)
 MIN_HZ = 30.0
 FLOOR_DB, RANGE_DB = 14.0, 70.0  # of a line above the local median, below the strongest line
 NEAR = 0.015  # relative distance of the lines of one spectrum
-MAX_LINES, MAX_ADDED, MAX_STEPS = 30, 8, 15  # of a fit, by one residual
+MAX_LINES, MAX_ADDED, MAX_STEPS = 60, 8, 15  # of a fit, by one residual
 MIN_SIGNAL = 4.0  # amplitude over its standard error
 TORN = 0.5  # lines closer than this share of their half width are one mode, of which nothing would be known
 SKIP_S, MIN_S = 0.002, 0.15
 FIT_S, FIT_DECAYS = (0.4, 0.8), 3.0  # length of the fit: so many times 1 / d of the slowest line, within these limits
 T60_DECAY = math.log(1000.0)
 ROOM_T60_S, ROOM_LEVELS = (0.15, 0.25, 0.4, 0.6, 0.9, 1.4), tuple(10 ** (db / 10) for db in (-28, -24, -20, -16, -12, -8, -4))
+MIN_ROOM_S = 0.12
 ROOM_STEP_S = 0.008  # of a line's amplitudes
 ROOM_BAND_HZ, ROOM_MINOR = 70.0, 0.5  # lines so near, weaker by this factor, are the flicker of a line
 ROOM_SHARE, QUIET_SHARE = 0.2, 0.02  # least standard error of a decay, of the decay: in a room; else: a room too weak to be noticed
@@ -65,14 +67,15 @@ def read_wav(path):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", scipy.io.wavfile.WavFileWarning)
             rate, samples = scipy.io.wavfile.read(path)
-    except (OSError, ValueError, EOFError, MemoryError) as error:
+    except (OSError, ValueError, EOFError, MemoryError, struct.error, ArithmeticError, TypeError, LookupError, NameError) as error:
         raise InputError(f"{path}: cannot be read as a WAV file: {error}; save it as PCM, uncompressed") from None
-    samples = numpy.asarray(samples, float).reshape(len(samples), -1)
+    samples = numpy.asarray(samples, float)
+    samples = samples.reshape(len(samples), -1) if samples.size else numpy.empty((0, 1))
     if not len(samples) or not numpy.isfinite(samples).all():
         raise InputError(f"{path}: has no samples, or some that are no numbers; save it as PCM")
     samples = samples[:, numpy.argmax(numpy.var(samples, axis=0))]
-    if rate < 8000 or not MIN_S < len(samples) / rate < MAX_WAV_S:
-        length = len(samples) / rate
+    length = len(samples) / max(rate, 1)
+    if rate < 8000 or not MIN_S < length < MAX_WAV_S:
         raise InputError(f"{path}: {length:.3g} s at {rate} Hz; give {MIN_S:g} to {MAX_WAV_S:g} s of one strike, at 8000 Hz or more")
     samples = samples - samples.mean()
     if not samples.any():
@@ -249,7 +252,8 @@ def find_room(residual, samples, rate):
         return None
     last = next((k for k in range(3, count) if left[k] < 3 * floor), count)
     slope = numpy.polyfit(numpy.arange(last) * 0.02, 10 * numpy.log10(left[:last]), 1)[0]
-    return min(60 / max(-slope, 6.0), 10.0)
+    t60_s = min(60 / max(-slope, 6.0), 10.0)
+    return t60_s if t60_s > MIN_ROOM_S else None  # shorter: modes that were not found
 
 
 class RoomDecays:
@@ -331,6 +335,8 @@ def hear(samples, rate):
     """The Hearing of a recorded strike."""
     notes = []
     start, end = find_strike(samples, rate, notes)
+    if end - start < 0.5 * MIN_S * rate:
+        raise InputError(f"{max(end - start, 0) / rate:.3f} s of sound follow the strike; record it to its end")
     lines = find_lines(samples[start:end], rate)
     if not lines:
         raise InputError("no tone stands out of the noise; record a strike nearer to the body")
@@ -348,6 +354,9 @@ def hear(samples, rate):
         if room_t60_s and left_t60_s:  # these lines are the flicker of the room; the other mode of a pair would have explained the rest
             break
         modes, room_t60_s = found, left_t60_s
+    if room_t60_s and modes.shape[1] >= MAX_LINES - MAX_ADDED and find_lines(sines.residual, rate, part):
+        notes.append(f"more than {modes.shape[1]} tones: the weaker ones are left out, and a room would not be noticed")
+        room_t60_s = None
     hz, decay, sd_hz, sd_decays, size = modes
     if room_t60_s:
         room = RoomDecays(sines, modes)

@@ -21,7 +21,8 @@ FINE = 2.0  # elements of the fine mesh along an edge, of the coarse
 MODES, SPARE_MODES = 24, 6  # of the first solve; above the highest wish: those that may come down
 SMOOTH, DAMPING = 0.02, 0.01  # weights of jumps and of the step, of the largest derivative
 WIDEST_PAIR, MAX_CLOSING, DEAR = 60.0, 6, 1e3  # cents of a beat; steps; price of a cent that is left, of all the volume
-CLEAR = 1.2  # a mode that must stay away is sent so much further
+CLEAR = 1.2  # a mode that must stay away is sent so much further,
+NEAR_APART = 1.5  # and stands against a wish within so much
 
 
 @dataclasses.dataclass
@@ -122,6 +123,7 @@ class Search:
                 continue
             highest = max(m for group in state.groups for m in group)
             self.modes = min(self.modes, highest + 1 + SPARE_MODES)
+            self.check_aparts(solution)
             return state
 
     def find_apart(self, body, state):
@@ -315,8 +317,23 @@ class Search:
         p = numpy.clip(state.p + found.x[:count] * body.step, body.low, body.high)
         return p, numpy.abs(a @ found.x[:count] - y)
 
+    def check_aparts(self, solution):
+        """InputError for modes to stay away from that are not there."""
+        for apart in self.aparts:
+            if not targets.find_kind(solution, apart.kind):
+                known = targets.list_kinds(solution)
+                raise targets.InputError(f"--apart {apart.kind}: not among the lowest {len(solution.kinds)} modes of this body; {known}")
+
     def find_obstacle(self, body, state, jacobian):
-        """The worst mode, and the bound that a step towards the wishes presses hardest upon."""
+        """The worst mode, the bound that a step towards the wishes presses hardest upon, and modes that hardly stay away."""
+        near = [
+            f"--apart {apart.kind}:{apart.cents:g}"
+            for apart in self.aparts
+            for group in targets.find_kind(state.solution, apart.kind)
+            for wished in state.groups
+            if not set(group) & set(wished) and abs(targets.to_cents(state.solution, group[0], wished[0])) < NEAR_APART * apart.cents
+        ]
+        also = f"; {near[0]} stands against it" if near else ""
         worst = int(numpy.argmax(numpy.abs(self.weights * state.off_cents)))
         name = self.wishes[worst].mode or f"the mode near {self.wishes[worst].hz:.6g} Hz"
         pull = -(jacobian * self.weights[:, None]).T @ (self.weights * state.off_cents) * body.step  # wish to raise p
@@ -325,6 +342,6 @@ class Search:
         up = numpy.where((state.p >= body.high - slack) & (pull > 0), pull, 0)
         text = f"{name} stays {state.off_cents[worst]:+.1f} cents off"
         if max(down.max(), up.max()) <= 0:
-            return f"{text}: no bound is in the way, but no cut within first order helps all wishes (a local minimum)"
+            return text + (also or ": no bound is in the way, but no cut within first order helps all wishes (a local minimum)")
         at, is_up = (int(up.argmax()), True) if up.max() >= down.max() else (int(down.argmax()), False)
-        return f"{text}: {body.names[at]}, {body.ceiling if is_up else body.floor}"
+        return f"{text}: {body.names[at]}, {body.ceiling if is_up else body.floor}{also}"

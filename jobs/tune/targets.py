@@ -93,6 +93,11 @@ def find_kind(solution, kind):
     return groups
 
 
+def list_kinds(solution):
+    names = ", ".join(dict.fromkeys(name.split(",")[0] for name in solution.kinds if name.strip("-")))
+    return f"it has: {names}" if names else "their kinds are unknown: name them by numbers, like mode 1"
+
+
 def to_cents(solution, mode, other):
     return 1200 * math.log2(solution.corrected_hz[mode] / solution.corrected_hz[other])
 
@@ -109,11 +114,11 @@ def find_groups(solution, wishes):
             pair = next((g for g in find_pairs(solution) if group[0] in g), group)
             groups.append(pair)
             continue
+        if number and int(number) < 1:
+            raise InputError(f"{wish.mode}: modes are numbered from 1")
         found = [[m] for m in range(len(solution.kinds))] if kind == "mode" else find_kind(solution, kind)
         if len(found) < int(number or 1):
-            names = ", ".join(dict.fromkeys(name.split(",")[0] for name in solution.kinds if name.strip("-")))
-            names = f"it has: {names}" if names else "their kinds are unknown: name them by numbers, like mode 1"
-            raise InputError(f"{wish.mode}: not among the lowest {len(solution.kinds)} modes of this body; {names}")
+            raise InputError(f"{wish.mode}: not among the lowest {len(solution.kinds)} modes of this body; {list_kinds(solution)}")
         groups.append(found[int(number or 1) - 1])
     taken = [m for group in groups for m in group]
     if len(set(taken)) != len(taken):

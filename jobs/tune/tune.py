@@ -7,7 +7,6 @@ import tempfile
 
 import numpy
 
-import job_file
 import measuring
 import programs
 import recut
@@ -17,9 +16,20 @@ import steps
 import targets
 from errors import InputError
 from quantities import LENGTH_UNITS, read_quantity
-from solver import Solver
+from solver import Solver, read_job
 
 NOT_REACHED = 5  # exit code
+MOST_M, TOLERANCE_M = 5e-4, 2e-5
+WISHES = {"--partials", "--fundamental", "--hz", "--bell", "--modes", "--apart", "--cents"}
+# What may be removed or changed, and the options that each takes.
+WAYS = {
+    "--close-pairs": {"--keep", "--most", "--wall", "--knots", "--remove", "--map", "--cents", "--tolerance"},
+    "--map": WISHES | {"--most", "--wall", "--knots", "--remove", "--tolerance"},
+    "--outline": WISHES | {"--wall", "--knots", "--remove", "--tolerance"},
+    "--free": WISHES | {"--tolerance"},
+    "--cuts": set(),
+    "": WISHES | {"--wall", "--knots", "--remove", "--tolerance"},
+}
 
 
 def add_command(commands):
@@ -70,34 +80,50 @@ def add_command(commands):
         "(default) of a map",
     )
     add("--wall", type=length, metavar="LENGTH", help="least wall left, like 3mm (default: a quarter of the thickness)")
-    add("--most", type=length, metavar="LENGTH", default="0.5mm", help="deepest local cut (default: 0.5mm)")
+    add("--most", type=length, metavar="LENGTH", help="deepest local cut (default: 0.5mm)")
     add("--knots", type=int, metavar="N", help="depths along half of a bar (default: 6), along an outline (8); of a map: cuts (42)")
-    add("--cents", type=float, default=0.2, help="largest distance from a wish (default: 0.2)")
-    add("--tolerance", type=length, metavar="LENGTH", default="0.02mm", help="of the milling, for the guarantee (default: 0.02mm)")
+    add("--cents", type=float, help="largest distance from a wish (default: 0.2)")
+    add("--tolerance", type=length, metavar="LENGTH", help="of the milling, for the guarantee (default: 0.02mm)")
     add("--bin", metavar="FOLDER", help="folder of carillon-precompute (default: next to this program)")
     add("--json", action="store_true", help="print the result as one JSON document")
 
 
+def check_ways(options):
+    """InputError for options that contradict each other."""
+    given = {
+        name
+        for name in {*WAYS, *WISHES, "--keep", "--most", "--wall", "--knots", "--remove", "--tolerance"} - {""}
+        if getattr(options, name[2:].replace("-", "_")) not in (None, "", [], False)
+    }
+    way = next((name for name in WAYS if name in given), "")
+    if wrong := sorted(given - WAYS[way] - {way}):
+        raise InputError(f"{wrong[0]} has no effect on {f'a tuning by {way}' if way else 'an undercut bar'}; leave one of them out")
+    if options.hz and options.fundamental:
+        raise InputError("--fundamental has no effect on --hz, which gives frequencies; leave one of them out")
+
+
 def run(options):
     """(text, document) of the command."""
-    if not 0.001 <= options.cents <= 100:
+    cents = 0.2 if options.cents is None else options.cents
+    if not 0.001 <= cents <= 100:
         raise InputError("--cents: between 0.001 and 100")
     if options.knots is not None and not 1 <= options.knots <= 400:
         raise InputError("--knots: between 1 and 400")
+    check_ways(options)
     if options.cuts:
         return recut.run(options)
-    job = job_file.read_job(options.job)
-    wall, tolerance = options.wall, options.tolerance
+    job = read_job(options.job)
+    wall, tolerance = options.wall, options.tolerance or TOLERANCE_M
     say = (lambda text: None) if options.json else (lambda text: print(text, flush=True))
     solver = Solver(programs.find_program(options.bin), options.job)
-    with results.make_folder(options.out) as out, tempfile.TemporaryDirectory(prefix="carillon-tune-") as name:
+    with results.make_folder(options.out, results.FILES) as out, tempfile.TemporaryDirectory(prefix="carillon-tune-") as name:
         folder = pathlib.Path(name)
         aparts = [targets.read_apart(text) for text in options.apart]
-        search = steps.Search(solver, [], aparts, options.cents, folder, say)
+        search = steps.Search(solver, [], aparts, cents, folder, say)
         mesher = programs.find_program(options.bin, "carillon-mesh")
         if options.close_pairs or options.map:
             mesh = shapes.read_mesh(job, options.job, folder, mesher)
-            body = shapes.make_map(job, mesh, options.knots or 42, options.most, options.remove or "all", wall)
+            body = shapes.make_map(job, mesh, options.knots or 42, options.most or MOST_M, options.remove or "all", wall)
             make_body, start_p = lambda fineness: body, numpy.zeros(len(body.names))
         elif options.outline:
             rows, knots = shapes.read_outline(options.outline), options.knots or 8

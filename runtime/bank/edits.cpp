@@ -151,6 +151,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
     scale_size(edited.multipoles, g);
   scale_energy(edited.quartic, s, k, g);
   for (double& x : edited.sensitivities.scale) x /= g * g * g;
+  for (float& area_m2 : edited.sensitivities.area_m2) area_m2 *= static_cast<float>(g * g);
   const Multipoles& air = edited.multipoles;
   edited.material.young_modulus_pa *= k;
   edited.material.density_kg_m3 *= s;

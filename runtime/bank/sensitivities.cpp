@@ -21,8 +21,10 @@ using Eigen::MatrixXd;
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 using Point = std::array<double, 3>;  // barycentric
 
-constexpr double kSharpDeg = 50.0;  // edges that are less sharp belong to smooth surfaces
-constexpr int kDoubtfulRings = 2;   // elements around such an edge
+constexpr double kSharpDeg = 50.0;   // edges that are less sharp belong to smooth surfaces,
+constexpr double kInwardDeg = 15.0;  // but inward ones over this that are
+constexpr double kSharper = 2.0;     // so much sharper than the next
+constexpr int kDoubtfulRings = 2;    // elements around such an edge
 
 /// Nodes of a face and its triangles between them: one, or four with the middles of the edges.
 struct Face {
@@ -115,19 +117,32 @@ Vec3 find_normal(const Bank& bank, std::int32_t triangle) {
   return normalise(cross(bank.vertices_m[b] - bank.vertices_m[a], bank.vertices_m[c] - bank.vertices_m[a]));
 }
 
-/// Vertices of inward edges over kSharpDeg and fixed ones, with those of the elements around them.
+/// Vertices of sharp inward edges and fixed ones, with those of the elements around them. An inward edge is sharp over kSharpDeg, and over
+/// kInwardDeg where it is much sharper than the next ones: those of a coarse smooth surface are about equal.
 std::vector<std::uint8_t> find_doubtful(const Bank& bank, const std::vector<Face>& faces, std::span<const std::uint8_t> fixed) {
-  std::vector<std::uint8_t> doubtful(fixed.begin(), fixed.end());
-  doubtful.resize(bank.vertex_count(), 0);
-  const double most = std::cos(kSharpDeg * std::numbers::pi / 180.0);
+  struct Edge {
+    std::array<std::int32_t, 2> end, opposite;
+    double angle_deg;
+  };
+  std::vector<Edge> edges;
+  std::vector<double> largest_deg(bank.vertex_count(), 0.0);  // of the inward edges of a vertex
   for_each_edge(bank.triangles, bank.vertex_count(), [&](std::int32_t lower, const HalfEdge* first, const HalfEdge* last) {
     if (last - first != 2) return;
-    const std::int32_t t = first->number / 3, other = (first + 1)->number / 3;
-    const Vec3 normal = find_normal(bank, t);
-    const std::int32_t opposite = bank.triangles[other][((first + 1)->number % 3 + 2) % 3];
-    const bool is_inward = dot(normal, bank.vertices_m[opposite] - bank.vertices_m[lower]) > 0.0;
-    if (is_inward && dot(normal, find_normal(bank, other)) < most) doubtful[lower] = doubtful[first->upper] = 1;
+    const auto find_opposite = [&](const HalfEdge& edge) { return bank.triangles[edge.number / 3][(edge.number % 3 + 2) % 3]; };
+    const Vec3 normal = find_normal(bank, first->number / 3), other = find_normal(bank, (first + 1)->number / 3);
+    const Edge edge{{lower, first->upper},
+                    {find_opposite(*first), find_opposite(*(first + 1))},
+                    std::acos(std::clamp(dot(normal, other), -1.0, 1.0)) * 180.0 / std::numbers::pi};
+    if (!(dot(normal, bank.vertices_m[edge.opposite[1]] - bank.vertices_m[lower]) > 0.0)) return;
+    for (const std::int32_t v : edge.end) largest_deg[v] = std::max(largest_deg[v], edge.angle_deg);
+    if (edge.angle_deg > kInwardDeg) edges.push_back(edge);
   });
+  std::vector<std::uint8_t> doubtful(fixed.begin(), fixed.end());
+  doubtful.resize(bank.vertex_count(), 0);
+  for (const Edge& edge : edges) {
+    const double next_deg = std::max(largest_deg[edge.opposite[0]], largest_deg[edge.opposite[1]]);
+    if (edge.angle_deg > kSharpDeg || edge.angle_deg > kSharper * next_deg) doubtful[edge.end[0]] = doubtful[edge.end[1]] = 1;
+  }
   for (int ring = 0; ring < kDoubtfulRings; ++ring) {
     const std::vector<std::uint8_t> before = doubtful;
     for (const Face& face : faces) {

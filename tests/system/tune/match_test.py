@@ -153,10 +153,22 @@ class Match(unittest.TestCase):
         self.write("letters.csv", "hz\n440\nabc\n")
         self.write("empty.csv", "hz\n")
         self.write("notes.wav", "no sound")
+        self.write("short.csv", "hz,t60_s\n440,1e-300\n")
+        self.write("long.csv", "hz\n" + "4" * 200000)
+        whole = (self.folder / "noisy.wav").read_bytes()
+        for name, content in (("cut.wav", whole[:30]), ("head.wav", whole[:44]), ("align.wav", whole[:32] + b"\0\0" + whole[34:])):
+            (self.folder / name).write_bytes(content)
+        (self.folder / "taken/peaks.csv").mkdir(parents=True)
         for words, says in (
             (["start.json", "letters.csv"], "letters.csv:3: hz is 'abc'"),
             (["start.json", "empty.csv"], "empty.csv: has no peaks"),
             (["start.json", "notes.wav"], "notes.wav: cannot be read as a WAV file"),
+            (["start.json", "short.csv"], "short.csv:2: t60_s is 1e-300"),
+            (["start.json", "long.csv"], "long.csv: cannot be read as a table"),
+            (["start.json", "cut.wav"], "cut.wav: cannot be read as a WAV file"),
+            (["start.json", "head.wav"], "head.wav: has no samples"),
+            (["start.json", "align.wav"], "align.wav: cannot be read as a WAV file"),
+            (["start.json", "noisy.wav", "-o", "taken"], "taken/peaks.csv: is a folder"),
             (["none.json", "noisy.wav"], "none.json: cannot read the job"),
             (["start.json", "noisy.wav", "--mass", "3"], "--mass"),
         ):

@@ -167,6 +167,7 @@ class Sensitivity(unittest.TestCase):
             (("plain.hdf",), '"sensitivities": 30'),
             (("none.hdf",), "no such file"),
             (("bar.hdf", "-o", "map.txt"), "give a .csv, .png or .glb"),
+            (("bar.hdf", "-o", "map.csv", "-o", "none/map.glb"), "there is no folder none"),
             (("bar.hdf", "--mode", "99"), "modes 1 to"),
             (("bar.hdf", "--cut", "2"), "unit"),
             (("bar.hdf", "--radius", "1mm"), "--at"),
@@ -176,6 +177,15 @@ class Sensitivity(unittest.TestCase):
             error = self.run_command(*words, code=2)
             self.assertIn(expected, error)
             self.assertEqual(len(error.strip().splitlines()), 1, error)
+        self.assertFalse((self.folder / "map.csv").exists())
+
+    def test_edited_size_is_that_of_a_new_solve(self):
+        words = [BIN / "carillon-bank", "edit", "bar.hdf", "large.hdf", "--size", "2"]
+        subprocess.run(words, cwd=self.folder, check=True, capture_output=True)
+        find = lambda bank, cut: json.loads(self.run_command(bank, "--cut", cut, "--json"))["modes"]
+        for small, large in zip(find("bar.hdf", "0.1mm"), find("large.hdf", "0.2mm")):
+            self.assertAlmostEqual(large["cents"], small["cents"], delta=1e-4 * abs(small["cents"]))
+            self.assertAlmostEqual(large["thickness"], small["thickness"], delta=1e-3 * abs(small["thickness"]))
 
 
 if __name__ == "__main__":

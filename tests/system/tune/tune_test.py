@@ -6,6 +6,7 @@ usage: tune_test.py BIN_DIR [CLASS ...]
 import json
 import math
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -16,6 +17,7 @@ import numpy
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "jobs/tune"), str(ROOT / "jobs/study"), str(ROOT / "tests/support")]
+import grid
 import mesh_file
 import shapes
 import solver
@@ -154,11 +156,23 @@ class Unreachable(Case):
             (["--hz", "200", "--remove", "left"], "left"),
             (["--hz", "200", "--apart", "torsion"], "torsion"),
             (["--hz", "200", "--free", "body.wall_m=1:2"], "body.wall_m"),
+            (["--hz", "200", "--free", "body.length_m=0.1:inf"], "body.length_m"),
+            (["--hz", "200", "--modes", "mode 0"], "mode 0: modes are numbered from 1"),
+            (["--hz", "200", "--fundamental", "400"], "--fundamental has no effect"),
+            (["--hz", "200", "--map", "--outline", "bell.csv"], "--outline has no effect"),
+            (["--hz", "200", "--keep", "2"], "--keep has no effect"),
+            (["--hz", "200", "--apart", "wobble:50"], "--apart wobble"),
         ):
             done = self.tune(PLANK, *words, code=2)
             self.assertIn(part, done["error"])
         done = self.tune({"mesh": "none.msh"} | {key: PLANK[key] for key in ("material", "bank")}, "--hz", "200", code=2)
         self.assertIn("none.msh", done["error"])
+        body = shapes.make_undercut(PLANK, 1.0)
+        grid.write_msh(self.folder / "two.msh", body.nodes, body.tets)
+        text = (self.folder / "two.msh").read_text()
+        (self.folder / "two.msh").write_text(re.sub(r"^(\d*[02468] 11 2 )1", r"\g<1>2", text, flags=re.MULTILINE))
+        job = {"mesh": "two.msh", "materials": {"2": "steel"}} | {key: PLANK[key] for key in ("material", "bank")}
+        self.assertIn("several materials", self.tune(job, "--map", "--hz", "200", "--modes", "mode 1", code=2)["error"])
 
 
 def cast_bowl(folder, nodes=6000):
@@ -190,6 +204,33 @@ class Shells(Case):
         self.assertLessEqual(max(done["parameters"].values()), 0.0005)
         again = self.solve(json.loads((self.folder / "out/job.json").read_text()) | {"mesh": str(self.folder / "out/body.msh")}, 8)
         self.assertLess(1200 * math.log2(again.freq_hz[1] / again.freq_hz[0]), 0.1)
+
+    def test_closed_bowl_from_an_outline(self):
+        """Its pole is on the axis; mode shapes of a mesh that is right there come in pairs."""
+        angle = numpy.radians(numpy.linspace(0, 80, 24))
+        rows = numpy.column_stack([70 * numpy.sin(angle), -70 * numpy.cos(angle), numpy.full(24, 4.0)])
+        for name, some in (("up", rows), ("down", rows[::-1])):
+            numpy.savetxt(self.folder / f"{name}.csv", some, delimiter=",", header="r,z,thickness", comments="")
+            body = shapes.make_lathe(CUP, shapes.read_outline(self.folder / f"{name}.csv"), 1.0)
+            solved = self.solve(body.make_job(numpy.zeros(8), self.folder), 8)
+            pairs = targets.find_pairs(solved, 0.5)
+            self.assertGreaterEqual(len(pairs), 2, solved.corrected_hz)
+            volume = 2 * math.pi * 0.07**2 * (1 - math.cos(angle[-1])) * 0.004 * (1 + (0.004 / 0.07) ** 2 / 12)
+            self.assertAlmostEqual(solved.volume_m3, volume, delta=0.005 * volume)
+
+    def test_mesh_in_millimetres(self):
+        """Its map is that of the mesh in metres."""
+        words = ["--shape", "plate", "--length", "0.2", "--width", "0.14", "--thickness", "0.006", "--nodes", "2000", "--order", "2", "-q"]
+        subprocess.run([BIN / "carillon-mesh", *words, "-o", "metres.msh"], cwd=self.folder, check=True)
+        mesh = mesh_file.MeshFile(self.folder / "metres.msh")
+        mesh.nodes = (1e3 * numpy.array(mesh.nodes)).tolist()
+        mesh.write(self.folder / "millimetres.msh")
+        after = []
+        for name, scale in (("metres", 1.0), ("millimetres", 1e-3)):
+            job = {"mesh": f"{name}.msh", "mesh_scale": scale, "material": "aluminium", "bank": "plate.hdf"}
+            done = self.tune(job, "--map", "--hz", "681", "--modes", "mode 1", "--knots", "12", "--cents", "2")
+            after.append(done["modes"][0]["after_hz"])
+        self.assertAlmostEqual(*after, delta=1e-3)
 
     def test_removal_map_of_a_plate(self):
         """Two modes lowered by different cents, by cuts within their limit."""

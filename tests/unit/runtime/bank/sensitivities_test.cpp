@@ -192,6 +192,43 @@ TEST(Sensitivities, AreDoubtfulNearFixedNodesAndInwardEdgesOnly) {
   }
 }
 
+// A floor that rises at an angle from x = 0 on is inward there; a floor of an arc of as many degrees an edge is smooth.
+TEST(Sensitivities, AreDoubtfulNearBluntInwardEdgesButNotOnSmoothSurfaces) {
+  for (const double angle_deg : {10.0, 20.0, 45.0}) {
+    for (const bool is_arc : {false, true}) {
+      const auto find_height = [&](int i) {  // at x = i
+        double height = 0.0;
+        for (int k = -2; k < i; ++k) {
+          const double slope_deg = is_arc ? (k + 0.5) * angle_deg : k < 0 ? 0.0 : angle_deg;
+          height += std::tan(slope_deg * std::numbers::pi / 180.0);
+        }
+        return height;
+      };
+      Bank bank = make_rod(4, false, 1.0);
+      bank.vertices_m.clear();
+      bank.triangles.clear();
+      for (int i = -2; i <= 2; ++i)
+        for (const double y : {0.0, 1.0})
+          for (const double z : {find_height(i), -9.0}) bank.vertices_m.push_back({1.0 * i, y, z});
+      const auto add = [&](std::int32_t a, std::int32_t b, std::int32_t c, std::int32_t d) {
+        bank.triangles.insert(bank.triangles.end(), {{a, b, c}, {a, c, d}});
+      };
+      for (std::int32_t v = 0; v < 16; v += 4) {  // top, bottom, both sides
+        add(v, v + 4, v + 6, v + 2);
+        add(v + 1, v + 3, v + 7, v + 5);
+        add(v, v + 1, v + 5, v + 4);
+        add(v + 2, v + 6, v + 7, v + 3);
+      }
+      add(0, 2, 3, 1);
+      add(16, 17, 19, 18);
+      quantise_shapes(bank, std::vector<double>(3 * bank.vertex_count(), 1.0));
+      const Sensitivities s = calc_sensitivities(bank, make_elasticity(0.3), kDensity, 1, {});
+      const bool is_doubtful = std::count(s.doubtful.begin(), s.doubtful.end(), 1) > 0;
+      EXPECT_EQ(is_doubtful, !is_arc && angle_deg > 15.0) << angle_deg << " degrees, arc " << is_arc;
+    }
+  }
+}
+
 TEST(Sensitivities, ReadBackAndArePackedAndScaledWithTheBank) {
   Bank bank = example::make_bank(8, 6);
   bank.sensitivities = calc_sensitivities(bank, make_elasticity(0.3), kDensity, 4, {});
@@ -222,7 +259,10 @@ TEST(Sensitivities, ReadBackAndArePackedAndScaledWithTheBank) {
   EXPECT_EQ(find_faults(low), std::vector<std::string>());
   Edits twice;
   twice.size_scale = 2.0;
-  EXPECT_NEAR(calc_edited(bank, twice).sensitivities.scale[0], bank.sensitivities.scale[0] / 8.0, 1e-12 * bank.sensitivities.scale[0]);
+  const Bank large = calc_edited(bank, twice);
+  EXPECT_NEAR(large.sensitivities.scale[0], bank.sensitivities.scale[0] / 8.0, 1e-12 * bank.sensitivities.scale[0]);
+  const std::vector<double> depth(bank.sensitivities.site_count(), 0.1), deep(depth.size(), 0.2);
+  EXPECT_NEAR(calc_changes(large, deep)[0], calc_changes(bank, depth)[0], 1e-5 * std::abs(calc_changes(bank, depth)[0]));
 }
 
 TEST(Sensitivities, EditsCutSpotsOnOneSide) {
