@@ -21,7 +21,7 @@ FLOOR_CENTS = 0.3  # of a measurement: temperature, support
 MISSED, EXTRA = 0.5, 4.5  # costs of a mode that is not heard and of a peak that is no mode, in squares of the deviation
 STEP, STEP_NU, STEP_SIZE = 0.02, 0.01, 0.01  # of the differences
 GATE_CENTS = (40.0, 25.0, 15.0)  # deviations allowed in the first assignments
-STARTS = 5
+STARTS, DRAWS = 5, 1000  # starts of the fit; points drawn near each
 WRONG_CHI2 = 3.0
 HEARD, ONE_TONE_CENTS = 1 / 3, 5.0  # share of the modes that a strike lets hear, at least; modes so close sound as one
 OUTLIER, OUTLIER_CENTS = 0.1, 0.5  # share of the squared deviation left without an outlier; its least deviation
@@ -136,6 +136,17 @@ def find_sizes(job):
     }
 
 
+def choose_apart(points, cost):
+    """The STARTS best points that are different."""
+    chosen = []
+    for k in numpy.argsort(cost):
+        if all((numpy.abs(points[k] - other) > 0.06).any() for other in chosen):
+            chosen.append(points[k])
+        if len(chosen) == STARTS:
+            break
+    return chosen
+
+
 class Matcher:
     """Fits the constants of a job's body to peaks."""
 
@@ -208,8 +219,7 @@ class Matcher:
                 x[[not c.is_plain and not c.name.startswith("nu") for c in self.constants]] += factor
                 points.append(x)
         points = numpy.array(points)
-        logs = numpy.sort(model.base + (points - model.x0) @ model.slopes.T, axis=1)
-        cost, _ = align(logs, self.log_peaks, self.make_sigma(model, GATE_CENTS[0]) / TO_CENTS)
+        cost = self.calc_costs(model, points)
         shift = points[:, 0] - self.prior[0]
         cost = cost + (shift / PRIOR) ** 2
         if nus[0] is not None:
@@ -217,12 +227,19 @@ class Matcher:
         best = int(numpy.argmin(cost))
         far = numpy.abs(shift - shift[best]) > 0.15
         rivals = [math.exp(shift[k] - shift[best]) for k in [numpy.argmin(numpy.where(far, cost, numpy.inf))] if cost[k] < cost[best] + 2]
-        starts = []
-        for k in numpy.argsort(cost):
-            if all((numpy.abs(points[k] - other) > 0.06).any() for other in starts):
-                starts.append(points[k])
-            if len(starts) == STARTS:
-                return starts, rivals
+        starts = choose_apart(points, cost)
+        return starts if self.constants[1].is_plain else starts + self.draw_starts(model, starts), rivals
+
+    def draw_starts(self, model, starts):
+        """Starts near others, drawn from the prior: the moduli of wood are wrong by different factors."""
+        random = numpy.random.default_rng(1)
+        points = numpy.concatenate([start + self.prior_sd * random.normal(size=(DRAWS, len(start))) for start in starts])
+        return choose_apart(points, self.calc_costs(model, points) + (((points - self.prior) / self.prior_sd) ** 2).sum(axis=1))
+
+    def calc_costs(self, model, points):
+        """(B) costs of the assignments at B points, on a linear model."""
+        logs = numpy.sort(model.base + (points - model.x0) @ model.slopes.T, axis=1)
+        return align(logs, self.log_peaks, self.make_sigma(model, GATE_CENTS[0]) / TO_CENTS)[0]
 
     def make_sigma(self, model, gate_cents=0.0):
         """(m, p) standard deviation of a peak from a mode [cents]: half its bar, a largest distance, and that of the peak."""
