@@ -21,7 +21,7 @@ WINDOWS_S = (0.08, 0.3, 1.2)
 MIN_HZ = 30.0
 FLOOR_DB, RANGE_DB = 14.0, 70.0  # of a line above the local median, below the strongest line
 NEAR = 0.015  # relative distance of the lines of one spectrum
-MAX_LINES, MAX_ADDED, MAX_STEPS = 60, 8, 15  # of a fit, by one residual
+MAX_LINES, MAX_ADDED, MAX_STEPS = 30, 8, 15  # of a fit, by one residual
 MIN_SIGNAL = 4.0  # amplitude over its standard error
 TORN = 0.5  # lines closer than this share of their half width are one mode, of which nothing would be known
 SKIP_S, MIN_S = 0.002, 0.15
@@ -354,7 +354,7 @@ def hear(samples, rate):
         if room_t60_s and left_t60_s:  # these lines are the flicker of the room; the other mode of a pair would have explained the rest
             break
         modes, room_t60_s = found, left_t60_s
-    if room_t60_s and modes.shape[1] >= MAX_LINES - MAX_ADDED and find_lines(sines.residual, rate, part):
+    if room_t60_s and modes.shape[1] == MAX_LINES and find_lines(sines.residual, rate, part):
         notes.append(f"more than {modes.shape[1]} tones: the weaker ones are left out, and a room would not be noticed")
         room_t60_s = None
     hz, decay, sd_hz, sd_decays, size = modes

@@ -101,10 +101,9 @@ void Space::open_window(double end_s) {
 
 /// Depth from which the bodies of an island are moved apart [m].
 double Space::calc_open_depth(const Island& island) const {
-  const bool is_alone = island.bodies.size() == 1 && std::none_of(island.pairs.begin(), island.pairs.end(), [&](const Pair* pair) {
-                          return pair->b >= 0 && bodies_.moves(pair->a) && bodies_.moves(pair->b);
-                        });
-  if (is_alone) return kDeepM;
+  const bool is_on_ground =
+      island.bodies.size() == 1 && std::all_of(island.pairs.begin(), island.pairs.end(), [](const Pair* pair) { return pair->b < 0; });
+  if (is_on_ground) return kDeepM;
   const bool wobbles = std::any_of(island.bodies.begin(), island.bodies.end(),
                                    [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlowSpeedMS; });
   return wobbles ? kMaxDepthM - kMissingDepthM : kMaxDepthM;
