@@ -266,6 +266,9 @@ void Model::add_damped_modes(const std::vector<Mode>& modes) {
   }
 }
 
+/// At least one, so that the rows of a body without modes differ: sensors find vertices by them.
+static std::size_t count_columns(std::size_t groups, std::size_t damped) { return std::max<std::size_t>(groups * kGroup + damped, 1); }
+
 /// True for the same modes in the same order.
 bool Model::has_modes_of(const Model& other) const {
   return ringing_ == other.ringing_ && std::equal(modes_.begin(), modes_.end(), other.modes_.begin(), other.modes_.end(),
@@ -276,7 +279,7 @@ void Model::copy_shapes(const bank::Bank& bank) {
   const auto surface = std::make_shared<ModelSurface>();
   surface_ = surface;
   surface->triangles = bank.triangles;
-  const std::size_t columns = surface->columns = sound_.size() * kGroup + damped_.size();
+  const std::size_t columns = surface->columns = count_columns(sound_.size(), damped_.size());
   base::reserve_large(surface->shape, bank.vertex_count() * 3 * columns);
   std::vector<std::int16_t> row(3 * columns, 0);  // of a vertex; empty lanes stay 0
   std::vector<std::uint32_t> first, column;       // per mode: column in a vertex's row of the bank, and here
@@ -538,7 +541,7 @@ std::shared_ptr<const Model> Model::read_tables(std::span<const std::byte> bytes
   const bool agrees = ringing >= 0 && static_cast<std::size_t>(ringing) <= groups * kGroup && (groups == 0 || ringing > 0) &&
                       model->modes_.size() == static_cast<std::size_t>(ringing) + model->damped_.size() && model->turn_.size() == groups &&
                       model->strike_.size() == groups && model->weight_.size() == groups && model->reach_.size() == groups &&
-                      reader.is_at_end() && surface->columns == groups * kGroup + model->damped_.size();
+                      reader.is_at_end() && surface->columns == count_columns(groups, model->damped_.size());
   if (!agrees) TableReader::refuse();
   const std::size_t vertices = surface->columns > 0 ? surface->shape.size() / (3 * surface->columns) : 0;
   for (const auto& triangle : surface->triangles)

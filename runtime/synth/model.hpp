@@ -25,7 +25,7 @@ namespace carillon::synth {
 /// Surface of a body for strikes: triangles and mode shapes. Models of one body may share it.
 struct ModelSurface {
   std::vector<std::array<std::int32_t, 3>> triangles;
-  std::size_t columns = 0;          // of a row of shapes: groups x kGroup ringing modes, then the damped ones
+  std::size_t columns = 1;          // of a row of shapes: groups x kGroup ringing modes, then the damped ones; at least one
   std::vector<std::int16_t> shape;  // (V, 3, columns), in steps of each mode's scale
   std::vector<float> largest;       // (groups x kGroup) largest squared motion of each ringing mode, in steps
 };

@@ -1,7 +1,7 @@
 // Method: a reading is one complex weight per ringing mode: with z = (q' + d q) + i omega_d q, Re(w z) is
 //   -omega^2 q - 2 d q' for w = -2 d + i (omega^2 - 2 d^2) / omega_d, q' for w = 1 + i d / omega_d, q for w = -i / omega_d.
 // The immediate response to a force, phi_i(p) phi_i(s) summed over modes, and the rigid body are a field over the vertices.
-// Source: rigid-body dynamics; strain of linear triangles: the gradient of the barycentric coordinates.
+// Source: rigid-body dynamics; strain: runtime/bank/gauge.hpp.
 #include "runtime/synth/sensor.hpp"
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include <limits>
 #include <string>
 
+#include "runtime/bank/gauge.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/sinc.hpp"
 #include "runtime/base/vector.hpp"
@@ -50,51 +51,6 @@ class RigidAnswer {
  private:
   Vec3 centre_m_, along_, spin_{};
 };
-
-/// A triangle of a bank, its unit normal and area.
-struct Face {
-  std::array<Vec3, 3> corner;
-  Vec3 normal;
-  double area_m2;
-  Face(const bank::Bank& bank, const std::array<std::int32_t, 3>& triangle)
-      : corner{bank.vertices_m[triangle[0]], bank.vertices_m[triangle[1]], bank.vertices_m[triangle[2]]} {
-    const Vec3 twice = cross(corner[1] - corner[0], corner[2] - corner[0]);
-    area_m2 = 0.5 * norm(twice);
-    normal = calc_unit(twice);
-  }
-  /// Gradient of the barycentric coordinate of a corner, along a direction.
-  double calc_slope(std::size_t k, const Vec3& along) const {
-    return dot(along, cross(normal, corner[(k + 2) % 3] - corner[(k + 1) % 3])) / (2.0 * area_m2);
-  }
-};
-
-/// Rows and weights of the strain along a direction: at each corner the mean over the triangles about it, weighted by area, and linear
-/// between the corners. The strain of one triangle is constant, and that of its middle only to first order.
-std::vector<std::pair<std::size_t, double>> find_gauge(const bank::Bank& bank, const SensorSettings& settings) {
-  constexpr double kSameFace = 0.9;  // cosine of the angle between triangles of one face
-  const Face own(bank, bank.triangles[settings.triangle]);
-  if (!(own.area_m2 > 0.0)) throw InputError("sensor: its triangle has no area; move it");
-  const auto lay = [direction = calc_direction(settings)](const Vec3& normal) { return direction - dot(direction, normal) * normal; };
-  if (!(norm(lay(own.normal)) > 1e-3)) throw InputError("sensor: a strain gauge lies in the surface, and its direction is normal to it");
-  std::vector<std::pair<std::size_t, double>> weights;
-  for (std::size_t corner = 0; corner < 3; ++corner) {
-    const std::int32_t vertex = bank.triangles[settings.triangle][corner];
-    const std::size_t first = weights.size();
-    double area_m2 = 0.0;
-    for (const auto& triangle : bank.triangles) {
-      if (std::find(triangle.begin(), triangle.end(), vertex) == triangle.end()) continue;
-      const Face face(bank, triangle);
-      if (!(face.area_m2 > 0.0) || dot(face.normal, own.normal) < kSameFace) continue;
-      area_m2 += face.area_m2;
-      const Vec3 along = calc_unit(lay(face.normal));
-      for (std::size_t k = 0; k < 3; ++k)
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          weights.emplace_back(static_cast<std::size_t>(triangle[k]) * 3 + axis, face.area_m2 * face.calc_slope(k, along) * along[axis]);
-    }
-    for (std::size_t i = first; i < weights.size(); ++i) weights[i].second *= settings.barycentric[corner] / area_m2;
-  }
-  return weights;
-}
 
 }  // namespace
 
@@ -136,7 +92,8 @@ void Sensor::check(const bank::Bank& bank, const SensorSettings& settings) const
 }
 
 Sensor::Weights Sensor::find_weights(const bank::Bank& bank, const SensorSettings& settings) const {
-  if (quantity_ == Quantity::kStrain) return find_gauge(bank, settings);
+  if (quantity_ == Quantity::kStrain)
+    return bank::calc_strain_weights(bank, settings.triangle, settings.barycentric, calc_direction(settings));
   const Vec3 along = calc_direction(settings);
   Weights weights;
   for (std::size_t corner = 0; corner < 3; ++corner)
@@ -176,7 +133,12 @@ void Sensor::add_modes(const Weights& weights) {
       sound_[group].wave[lane / 2][1][k][lane % 2] = static_cast<float>(-wave.imag());
     }
   }
-  if (quantity_ != Quantity::kAcceleration || surface.columns == 0) return;
+  if (quantity_ == Quantity::kStrain && model.get_mode_count() > 0 &&
+      std::none_of(along.begin(), along.end(), [](double x) { return x != 0.0; }))
+    throw InputError(
+        "sensor: no mode of this bank has strain at its place: theories of thin bodies have no motion in the surface; use "
+        "\"theory\": \"timoshenko\", or elements");
+  if (quantity_ != Quantity::kAcceleration) return;
   direct_.reserve(surface.shape.size() / surface.columns);
   for (std::size_t first = 0; first < surface.shape.size(); first += surface.columns) {
     double sum = 0.0;

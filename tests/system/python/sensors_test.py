@@ -160,9 +160,9 @@ class SensorsTest(unittest.TestCase):
         faces = self.bank.vertices_m[self.bank.triangles]
         top = numpy.flatnonzero(numpy.all(numpy.abs(faces[:, :, 2] - THICKNESS / 2) < 1e-6, axis=1))
         centres = faces.mean(axis=1)
-        duration_s = 2e-4
+        duration_s, worst = 2e-4, 0.0
         omega = 2 * numpy.pi * self.bank.frequency_hz[self.bending]
-        for aim in (0.0, 0.06, 0.12):
+        for aim in numpy.linspace(-0.15, 0.15, 11):
             triangle = int(top[numpy.argmin(numpy.hypot(centres[top, 0] - aim, centres[top, 1]))])
             strain = self.read("strain", duration_s, direction=(1, 0, 0), triangle=triangle)
             amplitudes, mean = self.fit(strain, CENTRE + duration_s)
@@ -172,8 +172,10 @@ class SensorsTest(unittest.TestCase):
             largest = numpy.max([numpy.abs(self.beam.curve(y)) for y in numpy.linspace(-0.2, 0.2, 81)], axis=0)
             scale = THICKNESS / 2 * largest * numpy.abs(self.beam.deflect(self.struck_m[0]))
             off = (read - known) / scale[: len(read)]
-            self.assertLess(numpy.abs(off[:5]).max(), 0.02)
+            worst = max(worst, numpy.abs(off[:5]).max())
             self.assertLess(abs(mean), 1e-9)
+        print(f"{self.id()}: {100 * worst:.2f} %")
+        self.assertLess(worst, 0.01)
 
     def test_a_slower_sensor_reads_the_same(self):
         place = [LENGTH / 4, 0, THICKNESS / 2]

@@ -11,6 +11,7 @@
 #include <numbers>
 #include <vector>
 
+#include "runtime/bank/select.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
@@ -348,6 +349,27 @@ TEST(Sensor, ADirectionHasAnyLength) {
   const auto wanted = play(make_bank(), {.direction = {0.0, 0.0, 1.0}}, {make_blow(1e-3)}, 500);
   for (const double length : {1e-300, 3.0, 1e300})
     EXPECT_EQ(play(make_bank(), {.direction = {0.0, 0.0, length}}, {make_blow(1e-3)}, 500), wanted) << length;
+}
+
+TEST(Sensor, ABodyWithoutModesMovesAsAWhole) {
+  const bank::Bank bank = make_cube_bank({{0.9 * kRate, 5.0, 1e-2, {0.3, -0.2, 1.0}, 0.1}});  // above half of the rate
+  for (const Quantity quantity : {Quantity::kAcceleration, Quantity::kVelocity, Quantity::kDisplacement}) {
+    const SensorSettings settings{.triangle = 2, .barycentric = kCorner, .direction = {0.0, 0.0, 1.0}, .quantity = quantity};
+    bank::Bank rigid = bank;
+    bank::keep_lowest(rigid, 0);
+    const std::vector<double> found = play(bank, settings, {make_blow(1e-3)}, 2000),
+                              wanted = solve(rigid, settings, make_blow(1e-3), 2000, true);
+    double largest = 0.0;
+    for (const double x : wanted) largest = std::max(largest, std::abs(x));
+    ASSERT_GT(largest, 0.0);
+    for (std::size_t n = 0; n < 1900; ++n) EXPECT_NEAR(found[n], wanted[n], 2e-2 * largest) << n;
+  }
+}
+
+TEST(Sensor, StrainWithoutMotionInTheSurfaceIsRefused) {
+  const bank::Bank bank = make_cube_bank({{400.0, 5.0, 1e-2, {0.0, 0.0, 1.0}, 0.1}});
+  const SensorSettings settings{.triangle = 2, .direction = {1.0, 0.0, 0.0}, .quantity = Quantity::kStrain};
+  EXPECT_THROW(Sensor(Model::make(bank, {.rate_hz = kRate}), bank, settings), InputError);
 }
 
 TEST(Sensor, StrainOfALinearFieldIsItsGradient) {
