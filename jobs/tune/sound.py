@@ -252,8 +252,7 @@ def find_room(residual, samples, rate):
         return None
     last = next((k for k in range(3, count) if left[k] < 3 * floor), count)
     slope = numpy.polyfit(numpy.arange(last) * 0.02, 10 * numpy.log10(left[:last]), 1)[0]
-    t60_s = min(60 / max(-slope, 6.0), 10.0)
-    return t60_s if t60_s > MIN_ROOM_S else None  # shorter: modes that were not found
+    return min(60 / max(-slope, 6.0), 10.0)
 
 
 class RoomDecays:
@@ -354,6 +353,8 @@ def hear(samples, rate):
         if room_t60_s and left_t60_s:  # these lines are the flicker of the room; the other mode of a pair would have explained the rest
             break
         modes, room_t60_s = found, left_t60_s
+    if room_t60_s and room_t60_s < MIN_ROOM_S:  # modes that were not found, or distortion
+        room_t60_s = None
     if room_t60_s and modes.shape[1] == MAX_LINES and find_lines(sines.residual, rate, part):
         notes.append(f"more than {modes.shape[1]} tones: the weaker ones are left out, and a room would not be noticed")
         room_t60_s = None

@@ -12,6 +12,10 @@ namespace carillon::mesh {
 
 namespace {
 
+std::string_view unquote(std::string_view name) {
+  return name.size() >= 2 && name.front() == '"' && name.back() == '"' ? name.substr(1, name.size() - 2) : name;
+}
+
 struct Keyword {
   std::string name;                               // upper case, without blanks
   std::map<std::string, std::string> parameters;  // names in upper case
@@ -104,14 +108,15 @@ Keyword InpReader::read_keyword() {
   for (std::size_t i = 1; i < fields_.size(); ++i) {
     const std::size_t equals = fields_[i].find('=');
     std::string_view value = equals == std::string_view::npos ? std::string_view() : trim(fields_[i].substr(equals + 1));
-    if (value.size() >= 2 && value.front() == '"' && value.back() == '"') value = value.substr(1, value.size() - 2);
-    keyword.parameters[to_upper(trim(fields_[i].substr(0, equals)))] = value;
+    keyword.parameters[to_upper(trim(fields_[i].substr(0, equals)))] = unquote(value);
   }
   if (keyword.name.empty()) cursor_.fail(keyword.place, "a keyword line without a keyword; correct it, or begin a comment with **");
   return keyword;
 }
 
 void InpReader::read_nodes(const Keyword& keyword) {
+  if (keyword.has("INPUT"))
+    cursor_.fail(keyword.place, "*NODE with INPUT is not read; write *NODE, then *INCLUDE, INPUT={}", keyword.get("INPUT"));
   if (keyword.get("SYSTEM") != "" && to_upper(keyword.get("SYSTEM")) != "R")
     cursor_.fail(keyword.place, "*NODE with SYSTEM={} is not read; write the nodes in Cartesian coordinates", keyword.get("SYSTEM"));
   CaeModel::Set* const set = keyword.get("NSET").empty() ? nullptr : &model_.open_set(false, keyword.get("NSET"));
@@ -194,7 +199,7 @@ void InpReader::read_set(const Keyword& keyword, bool is_elements) {
       continue;
     }
     for (std::string_view field : fields_) {
-      if (field.size() >= 2 && field.front() == '"' && field.back() == '"') field = field.substr(1, field.size() - 2);
+      field = unquote(field);
       if (field.empty()) continue;
       if (is_int(field))
         set.members.push_back({parse_int(cursor_, place, field, is_elements ? "an element" : "a node"), place});
@@ -228,7 +233,7 @@ void InpReader::read_boundary(const Keyword& keyword) {
     if (is_int(fields_[0]))
       model_.hold_node(parse_int(cursor_, place, fields_[0], "a node"), directions, place);
     else
-      model_.hold_set(std::string(fields_[0]), directions, place);
+      model_.hold_set(std::string(unquote(fields_[0])), directions, place);
   }
 }
 

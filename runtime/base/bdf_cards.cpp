@@ -8,7 +8,9 @@
 namespace carillon::base {
 namespace {
 
-constexpr std::size_t kNameWidth = 8, kDataEnd = 72, kFieldsOfLine = 8;
+constexpr std::size_t kNameWidth = 8, kDataEnd = 72, kFieldsOfLine = 8, kLargeFieldsOfLine = 4;
+
+bool is_continuation(std::string_view field) { return field.empty() || field[0] == '+' || field[0] == '*'; }
 
 }  // namespace
 
@@ -41,7 +43,10 @@ void BdfCards::add_fields() {
   std::string_view line = line_;
   if (line.find(',') != std::string_view::npos) {
     split(line, split_);
-    for (std::size_t i = 1; i <= kFieldsOfLine; ++i) fields_.push_back(i < split_.size() ? split_[i] : std::string_view());
+    const std::size_t width = split_[0].find('*') != std::string_view::npos ? kLargeFieldsOfLine : kFieldsOfLine;
+    // A line may be longer than that of a card in columns: all its fields are data, but for the name of a continuation.
+    const std::size_t last = split_.size() == width + 2 && is_continuation(split_.back()) ? width : std::max(width, split_.size() - 1);
+    for (std::size_t i = 1; i <= last; ++i) fields_.push_back(i < split_.size() ? split_[i] : std::string_view());
     return;
   }
   if (line.find('\t') != std::string_view::npos) {

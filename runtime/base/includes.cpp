@@ -42,8 +42,12 @@ std::optional<std::string_view> find_name(std::string_view line, bool has_asteri
   }
   if (!starts_with_word(line, kWord)) return std::nullopt;
   line.remove_prefix(kWord.size());
-  if (!has_asterisk)
+  if (!has_asterisk) {
+    const std::size_t quote = line.find_first_of("'\"");
+    const std::size_t end = quote == std::string_view::npos ? 0 : line.find(line[quote], quote + 1);
+    if (end != std::string_view::npos) line = trim(line.substr(0, line.find('$', end)));  // without a comment
     return line.empty() || (!is_blank(line[0]) && line[0] != '\'' && line[0] != '"') ? std::nullopt : std::optional(unquote(line));
+  }
   line = trim(line);
   if (!line.starts_with(',')) return line.empty() ? std::optional(line) : std::nullopt;
   line = trim(line.substr(1));

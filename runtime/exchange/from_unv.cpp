@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "runtime/exchange/results_lines.hpp"
 #include "runtime/exchange/solved_model.hpp"
@@ -36,6 +37,8 @@ class UnvReader {
       throw InputError(fmt::format("{}: the file has no modes (dataset 55, real normal modes, displacements); write them", name_));
     if (model_.tets.empty())
       throw InputError(fmt::format("{}: the file has no tetrahedra (dataset 2412, elements 111 or 118); write the mesh too", name_));
+    for (SolvedMode& mode : model_.modes)
+      if (mode.mass) *mode.mass *= mass_unit_;
     model_.program = "a universal file";
     return std::move(model_);
   }
@@ -49,10 +52,28 @@ class UnvReader {
   }
 
   void read_dataset(int number) {
+    if (number == 164) return read_units();
     if (number == 2411) return read_nodes();
     if (number == 2412) return read_elements();
     if (number == 55) return read_values();
     while (!is_mark(lines_.next("a dataset"))) {
+    }
+  }
+
+  /// Units per metre and per newton: metres, kilograms and seconds, or millimetres with masses in tonnes, or with others of mode masses.
+  void read_units() {
+    (void)lines_.next("the units");
+    const std::string_view factors = lines_.next("the units");
+    const auto per_metre = lines_.number<double>(factors, 0, 25, "the factor of lengths");
+    const auto per_newton = lines_.cut(factors, 25, 25).empty() ? 1.0 : lines_.number<double>(factors, 25, 25, "the factor of forces");
+    const auto is = [](double x, double wanted) { return std::abs(x - wanted) <= 1e-6 * wanted; };
+    if (!is(per_metre, 1.0) && !is(per_metre, 1000.0))
+      lines_.fail("the factor of lengths is {:g}; only 1 (metres) and 1000 (millimetres) are read: write the model in one of them",
+                  per_metre);
+    if (!(per_newton > 1e-6 && per_newton < 1e9)) lines_.fail("the factor of forces is {:g}; it has to be units per newton", per_newton);
+    model_.units = is(per_metre, 1.0) ? ModelUnits::kMetre : ModelUnits::kMillimetre;
+    mass_unit_ = 1.0 / per_newton;  // newton s^2 / length is a kilogram or a tonne
+    while (!is_mark(lines_.next("the units"))) {
     }
   }
 
@@ -139,6 +160,7 @@ class UnvReader {
   const std::string& name_;
   ResultsNodes<ResultsLines> nodes_{lines_};
   SolvedModel model_;
+  double mass_unit_ = 1.0;  // kilograms or tonnes of a mode's mass
 };
 
 }  // namespace

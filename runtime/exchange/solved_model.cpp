@@ -73,6 +73,19 @@ std::vector<Triangle> find_surface(const SolvedModel& model) {
   return surface;
 }
 
+/// True for equal eigenvalues and proportional shapes: modes of a pair are orthogonal.
+bool are_same(const SolvedMode& a, const SolvedMode& b) {
+  constexpr double kSame = 1e-6;
+  if (std::abs(a.eigenvalue_rad2_s2 - b.eigenvalue_rad2_s2) > kSame * std::abs(a.eigenvalue_rad2_s2)) return false;
+  double product = 0.0, of_a = 0.0, of_b = 0.0;
+  for (std::size_t n = 0; n < std::min(a.shape.size(), b.shape.size()); ++n) {
+    product += dot(a.shape[n], b.shape[n]);
+    of_a += dot(a.shape[n], a.shape[n]);
+    of_b += dot(b.shape[n], b.shape[n]);
+  }
+  return product * product > (1.0 - kSame) * of_a * of_b;
+}
+
 /// Modes that are not rigid, by frequency.
 std::vector<std::size_t> choose_modes(const SolvedModel& model, const std::string& name) {
   std::vector<double> lambda;
@@ -82,6 +95,10 @@ std::vector<std::size_t> choose_modes(const SolvedModel& model, const std::strin
   for (const std::size_t m : base::find_sort_order(lambda))
     if (lambda[m] > kRigidShare * highest) chosen.push_back(m);
   if (chosen.empty()) throw InputError(fmt::format("{}: all {} modes are rigid; solve for more modes", name, model.modes.size()));
+  for (std::size_t i = 1; i < chosen.size(); ++i)
+    if (are_same(model.modes[chosen[i - 1]], model.modes[chosen[i]]))
+      throw InputError(
+          fmt::format("{}: modes {} and {} are the same; write the modes of one step or analysis", name, chosen[i - 1] + 1, chosen[i] + 1));
   return chosen;
 }
 
@@ -100,14 +117,14 @@ std::vector<double> find_masses(const SolvedModel& model, double density, const 
   return masses;
 }
 
-void check_size(const bank::Bank& bank, const std::string& name, const ResultsReading& reading) {
+void check_size(const bank::Bank& bank, const std::string& name) {
   double largest = 0.0;
   for (std::size_t k = 0; k < 3; ++k) {
     const auto [low, high] =
         std::minmax_element(bank.vertices_m.begin(), bank.vertices_m.end(), [k](const Vec3& a, const Vec3& b) { return a[k] < b[k]; });
     largest = std::max(largest, (*high)[k] - (*low)[k]);
   }
-  if (!reading.are_units_given && largest > kLargestUnits)
+  if (largest > kLargestUnits)
     throw InputError(fmt::format(
         "{}: the body is {:g} units across; give --unit mm-t-s for millimetres, tonnes and seconds, or --unit m-kg-s", name, largest));
 }
@@ -127,7 +144,7 @@ bank::Bank make_bank(const SolvedModel& model, const std::string& name, const Re
   for (const auto& tet : model.tets)
     if (tet.size() != model.tets.front().size())
       throw InputError(fmt::format("{}: tetrahedra of 4 and of 10 nodes; use one order for the whole body", name));
-  const bool is_mm = reading.units == ModelUnits::kMillimetre;
+  const bool is_mm = (reading.are_units_given ? reading.units : model.units.value_or(reading.units)) == ModelUnits::kMillimetre;
   const double metres = is_mm ? 1e-3 : 1.0, per_root_kg = is_mm ? 1.0 / std::sqrt(1000.0) : 1.0;
   bank::Bank bank;
   std::vector<std::int32_t> vertex_of(model.nodes.size(), -1);
@@ -144,7 +161,7 @@ bank::Bank make_bank(const SolvedModel& model, const std::string& name, const Re
       }
       node = vertex;
     }
-  check_size(bank, name, reading);
+  if (!reading.are_units_given && !model.units) check_size(bank, name);
   const material::Material& material = *reading.material;
   bank.material = {material.young_modulus_pa, material.poisson_ratio, material.density_kg_m3, 0.0, 0.0};
   if (material.law == material::DampingLaw::rayleigh) {

@@ -35,6 +35,7 @@ struct SolvedModel {
   std::vector<Vec3> nodes;                     // (N, 3)
   std::vector<std::vector<std::size_t>> tets;  // indices of 4 nodes, or of 10: corners, then the middles of 01, 12, 20, 03, 13, 23
   std::vector<SolvedMode> modes;
+  std::optional<ModelUnits> units;  // that the file names
 };
 
 /// Bank of the surface of the tetrahedra and of all modes but the rigid ones, those below 1e-8 of the highest eigenvalue. Frequencies and

@@ -128,6 +128,21 @@ def check_universal(folder, nodes, tets):
             differ = abs(measure_levels(folder, "unv.hdf", found[0]) - levels)[levels > levels.max() - 60]
             assert differ.max() < 0.01, differ
     assert "imported from a universal file" in run(folder, BIN / "carillon-bank", "info", "unv.hdf")
+    # The same body in millimetres, with forces in newtons, so masses in tonnes, and in millinewtons, so in kilograms.
+    for force, share in (1.0, math.sqrt(1000)), (1000.0, 1.0):
+        scaled = [(freq, {node: [share * x for x in u] for node, u in shape.items()}) for freq, shape in modes]
+        write_unv_modes(folder / "mm.unv", 1000 * numpy.array(nodes), tets, scaled, 4.0, 0.0, 0.0, 2)
+        metres, *here = ["%25.17E" * 3 % factors for factors in ((1, 1, 1), (1000, force, 1))]
+        (folder / "mm.unv").write_text((folder / "mm.unv").read_text().replace(metres, here[0], 1))
+        run(folder, BIN / "carillon-bank", "import", "mm.unv", "--material", "ccx steel", "-o", "mm.hdf")
+        with h5py.File(folder / "mm.hdf") as bank, h5py.File(folder / "m.hdf") as other:
+            assert abs(bank["rigid/mass_kg"][()] / other["rigid/mass_kg"][()] - 1) < 1e-5, force
+        differ = abs(measure_levels(folder, "mm.hdf", read_bank(folder / "mm.hdf")[0]) - levels)[levels > levels.max() - 60]
+        assert differ.max() < 0.01, (force, differ)
+    twice = (folder / "b.uff").read_text()
+    (folder / "twice.unv").write_text(twice + twice[twice.index("    -1\n    55\n") :])
+    said = run(folder, BIN / "carillon-bank", "import", "twice.unv", "--material", "ccx steel", "-o", "x.hdf", code=2)
+    assert "twice.unv: modes" in said and "are the same" in said, said
     text = (folder / "b.uff").read_text()
     first = text.index("    55\n")
     damages = {

@@ -25,7 +25,7 @@ TEST(inp, sets_sections_units_supports) {
   const TetMesh mesh =
       parse_inp_text("** by hand\n*Heading\n any text\n" + kNodes + kTets +
                      "*NSET, NSET=Root, GENERATE\n1, 3, 2\n*NSET, NSET=Both\nROOT, 5\n*ELSET, ELSET=\"One of them\"\n11\n" + kSteel +
-                     "*BOUNDARY\nroot, 1, 3\n5, 2\n2, ENCASTRE\n" + kStep);
+                     "*BOUNDARY\n\"root\", 1, 3\n5, 2\n2, ENCASTRE\n" + kStep);
   EXPECT_EQ(mesh.order, 1);
   EXPECT_EQ(mesh.tet_count(), 2);
   EXPECT_EQ(mesh.nodes_m[4], (Vec3{1, 1, 1}));
@@ -183,6 +183,19 @@ TEST(bdf, cards) {
   EXPECT_NEAR(mesh.materials.at(2).poisson_ratio, 7.0 / 5.26 - 1.0, 1e-12);
   ASSERT_EQ(mesh.remarks.size(), 1U);
   EXPECT_NE(mesh.remarks[0].find("a.bdf:20: RBE2 is left out"), std::string::npos) << mesh.remarks[0];
+}
+
+TEST(bdf, free_fields_of_long_lines_and_of_large_cards) {
+  std::string text = kBdf;
+  const auto replace = [&](const std::string& old, const std::string& now) { text.replace(text.find(old), old.size(), now); };
+  replace("GRID,2,,1.,0.,0.\n", "GRID*,2,,1.,0.,*A\n*A,0.\n");
+  replace("MAT1,3,2.1+5,,0.3,7.85-9,,,0.002\n", "MAT1*,3,2.1+5,,0.3\n*,7.85-9,,,0.002\n");
+  replace("SPC1,2,123456,1,THRU,3\n", "SPC1,2,123456,1,2,3,1,2,3,1,2,3,1,2,5\n");
+  const TetMesh whole = parse(kBdf, MeshFormat::kBdf, "a.bdf"), mesh = parse(text, MeshFormat::kBdf, "a.bdf");
+  EXPECT_EQ(mesh.nodes_m, whole.nodes_m);
+  EXPECT_EQ(mesh.materials.at(1).density_kg_m3, whole.materials.at(1).density_kg_m3);
+  EXPECT_EQ(mesh.materials.at(1).loss_factor, 0.002);
+  EXPECT_EQ(mesh.node_sets.at("SPC"), (std::vector<std::int32_t>{0, 1, 2, 4}));
 }
 
 TEST(bdf, refused) {
