@@ -20,7 +20,7 @@ from errors import InputError
 from quantities import LENGTH_UNITS, MASS_UNITS, read_quantity
 
 FILES = ("material.json", "peaks.csv", "spectrum.svg")
-T60_RANGE_S = (1e-4, 1e4)
+T60_RANGE_S = (1e-4, 1e4)  # of a table of peaks
 COLUMNS = {"hz": True, "sd_hz": False, "t60_s": False, "sd_t60_s": False}  # is it required
 
 

@@ -36,8 +36,8 @@ def make_folder(name, files):
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{path}: cannot create folder: {error.strerror}; give another one with -o") from None
-    check_outputs(path / file for file in files)
     try:
+        check_outputs(path / file for file in files)
         yield path
     except BaseException:
         if is_new:

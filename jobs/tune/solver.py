@@ -127,7 +127,8 @@ def read_job(path):
     short = job.get("shape")
     if isinstance(short, dict) and len(short) == 1 and "body" not in job:
         [(name, sizes)] = short.items()
-        job = {key: value for key, value in job.items() if key != "shape"} | {"body": {"shape": name} | dict(sizes)}
+        if isinstance(sizes, dict):  # else carillon-precompute says what is wrong
+            job = {key: value for key, value in job.items() if key != "shape"} | {"body": {"shape": name} | sizes}
     return job
 
 

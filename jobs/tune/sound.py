@@ -28,7 +28,7 @@ SKIP_S, MIN_S = 0.002, 0.15
 FIT_S, FIT_DECAYS = (0.4, 0.8), 3.0  # length of the fit: so many times 1 / d of the slowest line, within these limits
 T60_DECAY = math.log(1000.0)
 ROOM_T60_S, ROOM_LEVELS = (0.15, 0.25, 0.4, 0.6, 0.9, 1.4), tuple(10 ** (db / 10) for db in (-28, -24, -20, -16, -12, -8, -4))
-MIN_ROOM_S = 0.12
+MIN_ROOM_S = 0.12  # T60; a residual that decays sooner is of modes that were not found, or distortion
 ROOM_STEP_S = 0.008  # of a line's amplitudes
 ROOM_BAND_HZ, ROOM_MINOR = 70.0, 0.5  # lines so near, weaker by this factor, are the flicker of a line
 ROOM_SHARE, QUIET_SHARE = 0.2, 0.02  # least standard error of a decay, of the decay: in a room; else: a room too weak to be noticed
@@ -67,6 +67,7 @@ def read_wav(path):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", scipy.io.wavfile.WavFileWarning)
             rate, samples = scipy.io.wavfile.read(path)
+    # The last five are what scipy's reader raises on damaged headers.
     except (OSError, ValueError, EOFError, MemoryError, struct.error, ArithmeticError, TypeError, LookupError, NameError) as error:
         raise InputError(f"{path}: cannot be read as a WAV file: {error}; save it as PCM, uncompressed") from None
     samples = numpy.asarray(samples, float)
@@ -353,7 +354,7 @@ def hear(samples, rate):
         if room_t60_s and left_t60_s:  # these lines are the flicker of the room; the other mode of a pair would have explained the rest
             break
         modes, room_t60_s = found, left_t60_s
-    if room_t60_s and room_t60_s < MIN_ROOM_S:  # modes that were not found, or distortion
+    if room_t60_s and room_t60_s < MIN_ROOM_S:
         room_t60_s = None
     if room_t60_s and modes.shape[1] == MAX_LINES and find_lines(sines.residual, rate, part):
         notes.append(f"more than {modes.shape[1]} tones: the weaker ones are left out, and a room would not be noticed")

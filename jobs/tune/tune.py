@@ -19,7 +19,7 @@ from quantities import LENGTH_UNITS, read_quantity
 from solver import Solver, read_job
 
 NOT_REACHED = 5  # exit code
-MOST_M, TOLERANCE_M = 5e-4, 2e-5
+CENTS, MOST_M, TOLERANCE_M = 0.2, 5e-4, 2e-5  # defaults
 WISHES = {"--partials", "--fundamental", "--hz", "--bell", "--modes", "--apart", "--cents"}
 # What may be removed or changed, and the options that each takes.
 WAYS = {
@@ -104,7 +104,7 @@ def check_ways(options):
 
 def run(options):
     """(text, document) of the command."""
-    cents = 0.2 if options.cents is None else options.cents
+    cents = CENTS if options.cents is None else options.cents
     if not 0.001 <= cents <= 100:
         raise InputError("--cents: between 0.001 and 100")
     if options.knots is not None and not 1 <= options.knots <= 400:

@@ -12,6 +12,7 @@ namespace carillon::mesh {
 using base::split;
 using base::to_upper;
 using base::trim;
+using base::unquote;
 
 /// Number of a field. InputError at `place` in the file.
 double parse_real(const Cursor& cursor, std::size_t place, std::string_view field, const char* what);

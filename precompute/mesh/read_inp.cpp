@@ -12,10 +12,6 @@ namespace carillon::mesh {
 
 namespace {
 
-std::string_view unquote(std::string_view name) {
-  return name.size() >= 2 && name.front() == '"' && name.back() == '"' ? name.substr(1, name.size() - 2) : name;
-}
-
 struct Keyword {
   std::string name;                               // upper case, without blanks
   std::map<std::string, std::string> parameters;  // names in upper case

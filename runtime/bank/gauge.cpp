@@ -26,7 +26,7 @@ struct Facet {
   double area_m2;
   Facet(const Bank& bank, const Triangle& triangle)
       : corner{bank.vertices_m[triangle[0]], bank.vertices_m[triangle[1]], bank.vertices_m[triangle[2]]} {
-    const Vec3 twice = cross(corner[1] - corner[0], corner[2] - corner[0]);
+    const Vec3 twice = calc_normal(bank.vertices_m, triangle);
     area_m2 = 0.5 * norm(twice);
     normal = calc_unit(twice);
   }

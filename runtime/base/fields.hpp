@@ -12,6 +12,8 @@ namespace carillon::base {
 /// Without blanks at both ends.
 std::string_view trim(std::string_view text);
 std::string to_upper(std::string_view text);
+/// Without blanks and a pair of single or double quotes around it.
+std::string_view unquote(std::string_view text);
 
 /// Fields of a line between commas, trimmed; an empty one after a comma at the end is left out.
 void split(std::string_view line, std::vector<std::string_view>& fields);

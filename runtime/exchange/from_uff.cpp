@@ -41,20 +41,13 @@ class FrfReader {
     if (lines_.cut(head, 0, 7) == "58b") return read_function(head, true);
     const int number = lines_.number<int>(head, 0, kUffLine, "the number of a dataset");
     if (number == 58) return read_function(head, false);
-    if (number == 164) read_units();
+    if (number == 164) units_per_metre_ = lines_.read_units().per_metre;
     for (std::string_view line = lines_.next("a dataset"); !is_mark(line); line = lines_.next("a dataset")) {
       if (number != 15 && number != 2411) continue;
       const auto node = lines_.number<std::int64_t>(line, 0, 10, "the number of a node");
       set_.nodes_m[node] =
           number == 15 ? lines_.vector(line, 40, 13, "a coordinate") : lines_.vector(lines_.next("the nodes"), 0, 25, "a coordinate");
     }
-  }
-
-  void read_units() {
-    (void)lines_.next("the units");
-    units_per_metre_ = lines_.number<double>(lines_.next("the units"), 0, 25, "the factor of lengths");
-    if (!(units_per_metre_ > 1e-6 && units_per_metre_ < 1e9))
-      lines_.fail("the factor of lengths is {:g}; it has to be units per metre, 1000 for mm", units_per_metre_);
   }
 
   struct Axis {

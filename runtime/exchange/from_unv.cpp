@@ -60,19 +60,15 @@ class UnvReader {
     }
   }
 
-  /// Units per metre and per newton: metres, kilograms and seconds, or millimetres with masses in tonnes, or with others of mode masses.
+  /// Metres or millimetres, with any unit of force.
   void read_units() {
-    (void)lines_.next("the units");
-    const std::string_view factors = lines_.next("the units");
-    const auto per_metre = lines_.number<double>(factors, 0, 25, "the factor of lengths");
-    const auto per_newton = lines_.cut(factors, 25, 25).empty() ? 1.0 : lines_.number<double>(factors, 25, 25, "the factor of forces");
-    const auto is = [](double x, double wanted) { return std::abs(x - wanted) <= 1e-6 * wanted; };
-    if (!is(per_metre, 1.0) && !is(per_metre, 1000.0))
+    const FileUnits units = lines_.read_units();
+    const auto is = [&](double wanted) { return std::abs(units.per_metre - wanted) <= 1e-6 * wanted; };
+    if (!is(1.0) && !is(1000.0))
       lines_.fail("the factor of lengths is {:g}; only 1 (metres) and 1000 (millimetres) are read: write the model in one of them",
-                  per_metre);
-    if (!(per_newton > 1e-6 && per_newton < 1e9)) lines_.fail("the factor of forces is {:g}; it has to be units per newton", per_newton);
-    model_.units = is(per_metre, 1.0) ? ModelUnits::kMetre : ModelUnits::kMillimetre;
-    mass_unit_ = 1.0 / per_newton;  // newton s^2 / length is a kilogram or a tonne
+                  units.per_metre);
+    model_.units = is(1.0) ? ModelUnits::kMetre : ModelUnits::kMillimetre;
+    mass_unit_ = 1.0 / units.per_newton;  // newton s^2 / length is a kilogram or a tonne
     while (!is_mark(lines_.next("the units"))) {
     }
   }

@@ -21,6 +21,11 @@
 
 namespace carillon::exchange {
 
+/// Factors of dataset 164 of universal files: units per metre and per newton (1: not given).
+struct FileUnits {
+  double per_metre = 1.0, per_newton = 1.0;
+};
+
 inline constexpr std::size_t kMaxResultNodes = 50'000'000, kMaxResultModes = 40'000;
 
 /// Reads lines and their columns. Errors are InputError "name:line: ...".
@@ -44,6 +49,17 @@ class ResultsLines {
     ++line_number_;
     if (line.ends_with('\r')) line.remove_suffix(1);
     return line;
+  }
+
+  /// Dataset 164, from its second line on. Later lines of it remain.
+  FileUnits read_units() {
+    (void)next("the units");
+    const std::string_view factors = next("the units");
+    FileUnits units{number<double>(factors, 0, 25, "the factor of lengths"), 1.0};
+    if (!cut(factors, 25, 25).empty()) units.per_newton = number<double>(factors, 25, 25, "the factor of forces");
+    if (!is_factor(units.per_metre)) fail("the factor of lengths is {:g}; it has to be units per metre, 1000 for mm", units.per_metre);
+    if (!is_factor(units.per_newton)) fail("the factor of forces is {:g}; it has to be units per newton", units.per_newton);
+    return units;
   }
 
   std::size_t remaining() const { return bytes_.size() - std::min(at_, bytes_.size()); }
@@ -86,6 +102,8 @@ class ResultsLines {
   }
 
  private:
+  static bool is_factor(double x) { return x > 1e-6 && x < 1e9; }
+
   std::string_view bytes_;
   const std::string& name_;
   std::size_t at_ = 0, line_number_ = 0;

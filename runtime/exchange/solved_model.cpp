@@ -73,10 +73,10 @@ std::vector<Triangle> find_surface(const SolvedModel& model) {
   return surface;
 }
 
-/// True for equal eigenvalues and proportional shapes: modes of a pair are orthogonal.
+constexpr double kSame = 1e-6;  // relative difference of the eigenvalues, and of the squared shapes, of a mode that is given twice
+
+/// True for proportional shapes: modes of a pair are orthogonal.
 bool are_same(const SolvedMode& a, const SolvedMode& b) {
-  constexpr double kSame = 1e-6;
-  if (std::abs(a.eigenvalue_rad2_s2 - b.eigenvalue_rad2_s2) > kSame * std::abs(a.eigenvalue_rad2_s2)) return false;
   double product = 0.0, of_a = 0.0, of_b = 0.0;
   for (std::size_t n = 0; n < std::min(a.shape.size(), b.shape.size()); ++n) {
     product += dot(a.shape[n], b.shape[n]);
@@ -96,9 +96,10 @@ std::vector<std::size_t> choose_modes(const SolvedModel& model, const std::strin
     if (lambda[m] > kRigidShare * highest) chosen.push_back(m);
   if (chosen.empty()) throw InputError(fmt::format("{}: all {} modes are rigid; solve for more modes", name, model.modes.size()));
   for (std::size_t i = 1; i < chosen.size(); ++i)
-    if (are_same(model.modes[chosen[i - 1]], model.modes[chosen[i]]))
-      throw InputError(
-          fmt::format("{}: modes {} and {} are the same; write the modes of one step or analysis", name, chosen[i - 1] + 1, chosen[i] + 1));
+    for (std::size_t j = i; j-- > 0 && lambda[chosen[i]] - lambda[chosen[j]] <= kSame * lambda[chosen[i]];)
+      if (are_same(model.modes[chosen[j]], model.modes[chosen[i]]))
+        throw InputError(
+            fmt::format("{}: modes {} and {} are the same; write the modes of one step or analysis", name, chosen[j] + 1, chosen[i] + 1));
   return chosen;
 }
 

@@ -176,7 +176,8 @@ void ModalImpacts::end_where_touching(const Step& step, TouchSets& touches) {
 }
 
 /// Moves a contact to its touch; true if a pulse ends because the touch is at another place.
-bool ModalImpacts::place(ModalContact& contact, const Pressed& pressed, Contact& touch, const geometry::Touch& at) {
+bool ModalImpacts::place(ModalImpact& modal, int k, Contact& touch, const geometry::Touch& at) {
+  ModalContact& contact = modal.contacts[k];
   Forces& forces = contact.forces;
   const bool is_swapped = forces.a != touch.a;
   contact.touch = touch.touch.id;
@@ -187,11 +188,11 @@ bool ModalImpacts::place(ModalContact& contact, const Pressed& pressed, Contact&
   touch.press();
   const Vec3 station = find_station(touch.a, touch.b, at);
   const double moved_ratio = norm(contact.station - station) / bodies_.calc_size(touch.a, touch.b);
-  if (moved_ratio < (pressed.depth_m > kYieldedM ? kMinYieldedRatio : kMinMoveRatio)) return false;
+  if (moved_ratio < (modal.impact->calc_depth(k) > kYieldedM ? kMinYieldedRatio : kMinMoveRatio)) return false;
   const bool has_pulse = moved_ratio >= kMinMoveRatio && (forces.continues || !forces.on_a.empty());
   report(contact);
   forces.continues = false;
-  forces.moves = pressed.is_closed;
+  forces.moves = modal.impact->get_compression(k) > 0.0;
   Hit hit{.a = touch.a, .b = touch.b, .touch = at, .triangles = touch.triangles};
   contact.station = station;
   for (const bool is_a : {true, false}) {
@@ -237,8 +238,7 @@ void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double way_m, double l
   const double reach_m = 2.0 * way_m + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kMaxDepthM;
   const auto follow_touch = [&](ModalContact& contact, Contact& c) {
     const int k = static_cast<int>(&contact - modal.contacts.data());
-    const Pressed pressed{modal.impact->get_compression(k) > 0.0, modal.impact->calc_depth(k)};
-    if (!place(contact, pressed, c, touches.find_closing(pair, c, length_s))) return;
+    if (!place(modal, k, c, touches.find_closing(pair, c, length_s))) return;
     modal.rolled = std::abs(modal.impact->calc_approach(k)) < kRattleSpeedMS ? modal.rolled + 1 : 0;
   };
   std::vector<Contact*> others;
@@ -259,7 +259,7 @@ void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double way_m, double l
       Hit hit{.a = c->a, .b = c->b, .touch = touches.find_closing(pair, *c, length_s), .triangles = c->triangles};
       Made made;
       add_contact(modal, *c, pair.sag_m, hit, false, made);
-      place(modal.contacts.back(), {}, *c, hit.touch);
+      place(modal, static_cast<int>(modal.contacts.size()) - 1, *c, hit.touch);
     }
   }
 }

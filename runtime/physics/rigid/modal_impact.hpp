@@ -101,12 +101,6 @@ class ModalImpacts {
     std::list<std::vector<double>> shapes;  // of the contacts
   };
 
-  /// State of a contact that is followed.
-  struct Pressed {
-    bool is_closed = false;
-    double depth_m = 0.0;  // by its spring and modes
-  };
-
   /// True if contacts of a body can belong to an impact, as it does itself or has neither motion nor modes.
   bool may_join(bool is_in, int body) const { return is_in || (!bodies_.moves(body) && !bodies_.has_modes(body)); }
   ModalImpact* find(int body);
@@ -117,7 +111,7 @@ class ModalImpacts {
   void follow(ModalImpact& modal, Pair& pair, double way_m, double length_s, TouchSets& touches);
   void part(Pair& pair, const TouchSets& touches) const;
   ModalContact* find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const;
-  bool place(ModalContact& contact, const Pressed& pressed, Contact& touch, const geometry::Touch& at);
+  bool place(ModalImpact& modal, int k, Contact& touch, const geometry::Touch& at);
   std::vector<impact::Spring> find_springs(const ModalImpact& modal, double part_s) const;
   std::vector<impact::Contact> place_springs(const ModalImpact& modal, const std::vector<impact::Body>& bodies, double part_s,
                                              std::list<std::vector<double>>& shapes) const;

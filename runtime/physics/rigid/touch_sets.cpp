@@ -411,8 +411,9 @@ void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
   pair.travelled_m += calc_way(pair, time_s, step_s) + Pair::kMovedM;
   if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecayS);
   limit_apart(pair);
-  const bool is_deep = std::any_of(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.touch.gap_m < -kDeepM; });
-  if (pair.stored_j > 0.0 && !is_deep && calc_explained_depth(pair) < kDeepM) lose_stored(pair);
+  const auto is_deep = [](const Contact& c) { return c.touch.gap_m < -kDeepM; };
+  if (pair.stored_j > 0.0 && calc_explained_depth(pair) < kDeepM && std::none_of(pair.contacts.begin(), pair.contacts.end(), is_deep))
+    lose_stored(pair);
 }
 
 void TouchSets::part(Pair& pair, double depth_m, const Vec3& normal) const {

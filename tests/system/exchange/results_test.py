@@ -143,6 +143,10 @@ def check_universal(folder, nodes, tets):
     (folder / "twice.unv").write_text(twice + twice[twice.index("    -1\n    55\n") :])
     said = run(folder, BIN / "carillon-bank", "import", "twice.unv", "--material", "ccx steel", "-o", "x.hdf", code=2)
     assert "twice.unv: modes" in said and "are the same" in said, said
+    first = min(modes, key=lambda mode: mode[0])
+    write_unv_modes(folder / "pair.unv", nodes, tets, [*modes, (first[0], modes[1][1]), first], 1.0, 0.0, 0.0, 2)
+    said = run(folder, BIN / "carillon-bank", "import", "pair.unv", "--material", "ccx steel", "-o", "x.hdf", code=2)
+    assert "are the same" in said, said  # a mode of another shape at the same frequency lies between them
     text = (folder / "b.uff").read_text()
     first = text.index("    55\n")
     damages = {

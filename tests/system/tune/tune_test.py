@@ -167,6 +167,8 @@ class Unreachable(Case):
             self.assertIn(part, done["error"])
         done = self.tune({"mesh": "none.msh"} | {key: PLANK[key] for key in ("material", "bank")}, "--hz", "200", code=2)
         self.assertIn("none.msh", done["error"])
+        done = self.tune({"shape": {"bar": 3}} | {key: PLANK[key] for key in ("material", "bank")}, "--hz", "200", code=2)
+        self.assertIn("job.json:1", done["error"])
         body = shapes.make_undercut(PLANK, 1.0)
         grid.write_msh(self.folder / "two.msh", body.nodes, body.tets)
         text = (self.folder / "two.msh").read_text()
